@@ -292,7 +292,7 @@ impl Monitor {
         let mut events = Vec::new();
         let former = self.begin_anew(benchmark);
         let context = StepContext {
-            phase: self.phase(now),
+            phase: self.phase(benchmark, now),
             covariates: &self.covariates,
         };
         let policy = self.settings.policy(benchmark);
@@ -338,11 +338,16 @@ impl Monitor {
         self.covariates.state(&self.settings.covariates);
         let mut events = self.unwatch(now, &former.watched);
         events.extend(self.reread(now, &former.watched));
-        let context = StepContext {
-            phase: self.phase(now),
-            covariates: &self.covariates,
-        };
-        for (id, track) in self.benchmarks.each_mut() {
+        let each: Vec<BenchmarkId> = self.benchmarks.all().keys().cloned().collect();
+        for id in &each {
+            let phase = self.phase(id, now);
+            let context = StepContext {
+                phase,
+                covariates: &self.covariates,
+            };
+            let Some(track) = self.benchmarks.get_mut(id) else {
+                continue;
+            };
             let declared = Declarations::of(&self.settings.declared, id);
             events.extend(track.accept(now, self.settings.accepted(id)));
             let policy = self.settings.policy(id);
@@ -351,9 +356,6 @@ impl Monitor {
                 events.extend(track.give_up_effects(now));
             }
             events.extend(track.redeclare(self.settings.policy(id), declared, &context));
-        }
-        let all: Vec<BenchmarkId> = self.benchmarks.all().keys().cloned().collect();
-        for id in &all {
             self.benchmarks.note_changed(id);
         }
         events

@@ -19,6 +19,8 @@ pub enum Notice {
     Watching,
     /// The past is about to be read: readings are taken, and judged once it has been.
     Past,
+    /// The same of this benchmark alone, of which nothing has been read, while others are watched already.
+    PastOf(BenchmarkId),
     /// The past has been read: the newest readings of the next benchmarks are judged.
     Current,
     /// The past of a benchmark is gone through a little further.
@@ -98,8 +100,8 @@ impl Monitor {
                 self.batches.begin();
                 Vec::new()
             }
-            Notice::Past => {
-                self.past.open();
+            Notice::Past | Notice::PastOf(_) => {
+                self.past.open(notice);
                 Vec::new()
             }
             Notice::Current => self.judge_current(now),

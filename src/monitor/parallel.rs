@@ -35,7 +35,7 @@ impl Monitor {
         next: impl Iterator<Item = &'a Input>,
         workers: &dyn Workers,
     ) -> usize {
-        if self.reads_past() {
+        if self.reads_all_past() {
             return MOST_TOGETHER;
         }
         let (mut seen, mut due) = (BTreeSet::new(), Vec::new());
@@ -62,7 +62,7 @@ impl Monitor {
                 let policy = self.settings.policy(benchmark);
                 let next = Some((source, reading));
                 // A thread costs more than to take what is not judged.
-                if track.may_judge(policy, reading.time, self.phase(reading.time)) {
+                if track.may_judge(policy, reading.time, self.phase(benchmark, reading.time)) {
                     due.push((
                         benchmark,
                         Due {
@@ -84,7 +84,7 @@ impl Monitor {
 
     /// Computes what the next [`super::Notice::BatchEnd`] judges of what queued. Changes no event.
     pub fn prepare_queued(&mut self, workers: &dyn Workers) {
-        if self.reads_past() {
+        if self.reads_all_past() {
             return;
         }
         let queued = self.batches.next();
@@ -118,11 +118,11 @@ impl Monitor {
             .collect();
         let covariates = &self.covariates;
         let tasks = due.into_iter().zip(&mut prepared);
-        let tasks = tasks.map(|((_, due), (_, result))| -> Task<'_> {
+        let tasks = tasks.map(|((id, due), (_, result))| -> Task<'_> {
             let now = due
                 .next
                 .map_or(self.tally.last_time(), |(_, reading)| Some(reading.time));
-            let phase = self.phase(now.unwrap_or_default());
+            let phase = self.phase(id, now.unwrap_or_default());
             let context = StepContext { phase, covariates };
             Box::new(move || *result = due.track.prepare(due.policy, due.next, &context))
         });

@@ -1,5 +1,5 @@
-//! A first start on a site's history: the readings are taken at once, what is current is judged, and the refits of the
-//! past are made after it, a few at a time.
+//! A first start on a site's history, or on that of one benchmark: the readings are taken at once, what is current is judged, and
+//! the refits of the past are made after it, a few at a time.
 
 use super::Monitor;
 use super::event::{Event, EventKind};
@@ -20,6 +20,9 @@ const MOST_REFITS: usize = 16;
 pub(super) struct Past {
     /// The past is being read: readings are taken, and none is judged.
     is_open: bool,
+    /// The same, of these benchmarks alone.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    of: BTreeSet<BenchmarkId>,
     /// Benchmarks whose newest reading is still to be judged.
     current: BTreeSet<BenchmarkId>,
     /// Those whose past is still to be gone through, and the reading that was judged first.
@@ -30,15 +33,27 @@ pub(super) struct Past {
 }
 
 impl Past {
+    /// Whether the past of all is being read.
     pub(super) fn is_open(&self) -> bool {
         self.is_open
     }
 
-    pub(super) fn open(&mut self) {
-        self.is_open = true;
+    /// From here on the past is read that `notice` says.
+    pub(super) fn open(&mut self, notice: &Notice) {
+        if let Notice::PastOf(benchmark) = notice {
+            self.of.insert(benchmark.clone());
+        } else {
+            self.is_open = true;
+        }
+    }
+
+    /// Whether the past of this benchmark is being read.
+    pub(super) fn is_open_of(&self, benchmark: &BenchmarkId) -> bool {
+        self.is_open || self.of.contains(benchmark)
     }
 
     pub(super) fn forget(&mut self, benchmark: &BenchmarkId) {
+        self.of.remove(benchmark);
         self.current.remove(benchmark);
         self.owed.remove(benchmark);
         self.walk.take_if(|walk| walk.benchmark() == benchmark);
@@ -70,14 +85,25 @@ impl Input {
 }
 
 impl Monitor {
-    /// Whether readings are taken without being judged, until [`Notice::Current`] says that the past has been read.
+    /// Whether readings of some benchmark are taken without being judged, until [`Notice::Current`] says that the past has been
+    /// read.
     pub fn reads_past(&self) -> bool {
+        self.past.is_open || !self.past.of.is_empty()
+    }
+
+    /// Whether those of all benchmarks are.
+    pub fn reads_all_past(&self) -> bool {
         self.past.is_open
+    }
+
+    /// The benchmarks of which the past alone is being read, where it is not that of all.
+    pub fn past_is_read_of(&self) -> impl Iterator<Item = &BenchmarkId> {
+        self.past.of.iter()
     }
 
     /// Whether there are benchmarks whose newest reading [`Notice::Current`] is to judge.
     pub fn owes_current(&self) -> bool {
-        self.past.is_open || !self.past.current.is_empty()
+        self.reads_past() || !self.past.current.is_empty()
     }
 
     /// Whether there are benchmarks whose past [`Notice::Retrace`] is to go through.
@@ -90,6 +116,8 @@ impl Monitor {
         if std::mem::take(&mut self.past.is_open) {
             self.past.current = self.benchmarks.all().keys().cloned().collect();
         }
+        let read = std::mem::take(&mut self.past.of);
+        self.past.current.extend(read);
         let (mut events, mut refits) = (Vec::new(), 0);
         for _ in 0..AT_ONCE {
             if refits >= MOST_REFITS {

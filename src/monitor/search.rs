@@ -67,13 +67,13 @@ impl Monitor {
         events
     }
 
-    /// How the monitor stands at this step.
-    pub(super) fn phase(&self, now: Timestamp) -> Phase {
+    /// How the monitor stands at this step of a benchmark.
+    pub(super) fn phase(&self, benchmark: &BenchmarkId, now: Timestamp) -> Phase {
         Phase {
             explain: self.settings.explain,
             now,
             in_batches: self.batches.are_in_use(),
-            is_past: self.past.is_open(),
+            is_past: self.past.is_open_of(benchmark),
             is_queue: self.batches.is_queue(),
             holds_scale: self.settings.holds_scale,
         }
@@ -86,7 +86,7 @@ impl Monitor {
         now: Timestamp,
     ) -> Option<(&mut Track, &Policy, StepContext<'_>)> {
         let context = StepContext {
-            phase: self.phase(now),
+            phase: self.phase(benchmark, now),
             covariates: &self.covariates,
         };
         let policy = self.settings.policy(benchmark);

@@ -66,12 +66,12 @@ pub async fn run(
         tracing::warn!(%error, "a limit on the length of files would end this process");
     }
     link::make_secret_of(config);
-    let behind = ServedState {
-        archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
-        reader: reader(config),
-    };
     let vitals = Arc::new(Vitals::default());
     show_stored(config, &store, &vitals).map_err(fail)?;
+    let behind = ServedState {
+        archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
+        reader: reader(config, &vitals),
+    };
     let mut pulse = Reporting::start(&config.site, vitals, behind).await?;
     let sinks = Sinks {
         store: Some(Arc::clone(&store)),
@@ -148,10 +148,10 @@ fn show_stored(config: &Config, store: &Store, vitals: &Vitals) -> Result<(), St
 }
 
 /// What the page asks, where the site listens. A page that cannot be shown is no reason not to watch.
-fn reader(config: &Config) -> Option<Arc<SiteReader>> {
+fn reader(config: &Config, vitals: &Arc<Vitals>) -> Option<Arc<SiteReader>> {
     config.site.listen?;
     match SiteReader::open(&config.site.state_dir, Facts::of(config)) {
-        Ok(reader) => Some(Arc::new(reader)),
+        Ok(reader) => Some(Arc::new(reader.of_daemon(Arc::clone(vitals)))),
         Err(error) => {
             tracing::error!(%error, "the page cannot be shown");
             None

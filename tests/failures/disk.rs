@@ -1,6 +1,6 @@
 //! A disk that is full, and one that fails.
 
-use crate::site::{Site, command, eventually, has_own_mounts, tamper};
+use crate::site::{Site, command, eventually, get, has_own_mounts, tamper};
 use slipwatch::monitor::Input;
 use slipwatch::store::{StepRow, Store};
 use std::fs;
@@ -22,39 +22,8 @@ fn failing() -> String {
         .collect()
 }
 
-/// 14.
-#[test]
-#[cfg_attr(
-    not(has_own_mounts),
-    ignore = "a process may not have mounts of its own here"
-)]
-fn on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room() {
-    if !has_own_mounts(
-        "disk::on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room",
-    ) {
-        return;
-    }
-    let site = Site::new("[alert]\nevacuation_time = \"3h\"\n");
-    site.append("incoming/5.csv", "time,displacement_mm\n");
-    let state = site.path("state");
-    fs::create_dir(&state).unwrap();
-    let folder = state.to_str().unwrap();
-    command(&["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", folder]);
-    let mut program = site.caught_up();
-    let filled = fs::write(state.join("ballast"), vec![0; 8 << 20]);
-    assert!(filled.is_err(), "three megabytes hold eight");
-    site.append("incoming/5.csv", &failing());
-    eventually("no room", || site.log().contains("no room on the disk"));
-    let reds = || site.notified("5/red/", "");
-    eventually("notified", || reds() > 0);
-    assert_eq!(site.values().len(), 0, "there was room");
-    let status = || site.printed(&["status", "--config", "site.toml"]);
-    let is_said = || {
-        status()
-            .replace("\n    ", " ")
-            .contains("in force there: 5 red")
-    };
-    eventually("what the state does not hold", is_said);
+/// Commands that ask the state say that it cannot be written, and what is in force.
+fn say_what_is_not_written(site: &Site) {
     for words in [
         &["alerts", "list"][..],
         &["alerts", "show", "5/red"],
@@ -78,6 +47,48 @@ fn on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room
             "{words:?}: {said}"
         );
     }
+}
+
+/// 14.
+#[test]
+#[cfg_attr(
+    not(has_own_mounts),
+    ignore = "a process may not have mounts of its own here"
+)]
+fn on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room() {
+    if !has_own_mounts(
+        "disk::on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room",
+    ) {
+        return;
+    }
+    let site = Site::new("[alert]\nevacuation_time = \"3h\"\n");
+    let address = site.listen();
+    site.append("incoming/5.csv", "time,displacement_mm\n");
+    let state = site.path("state");
+    fs::create_dir(&state).unwrap();
+    let folder = state.to_str().unwrap();
+    command(&["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", folder]);
+    let mut program = site.caught_up();
+    let filled = fs::write(state.join("ballast"), vec![0; 8 << 20]);
+    assert!(filled.is_err(), "three megabytes hold eight");
+    site.append("incoming/5.csv", &failing());
+    eventually("no room", || site.log().contains("no room on the disk"));
+    let reds = || site.notified("5/red/", "");
+    eventually("notified", || reds() > 0);
+    assert_eq!(site.values().len(), 0, "there was room");
+    let status = || site.printed(&["status", "--config", "site.toml"]);
+    let is_said = || {
+        status()
+            .replace("\n    ", " ")
+            .contains("in force there: 5 red")
+    };
+    eventually("what the state does not hold", is_said);
+    let shown = get(&address, "/api/site");
+    assert!(
+        shown.contains("\"is_not_written\":true") && shown.contains("\"level\":\"red\""),
+        "{shown}"
+    );
+    say_what_is_not_written(&site);
     assert_eq!(program.ended(), None, "{}", site.log());
     fs::remove_file(state.join("ballast")).unwrap();
     eventually("written", || site.values().len() == 114);
@@ -86,6 +97,9 @@ fn on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room
         site.log().contains("there is room on the disk again")
     });
     eventually("no fault", || !status().contains("FAULT"));
+    eventually("as written", || {
+        !get(&address, "/api/site").contains("is_not_written")
+    });
     let times: std::collections::BTreeSet<_> =
         (site.values().into_iter().map(|(_, time, _)| time)).collect();
     assert_eq!(times.len(), 114, "each once");

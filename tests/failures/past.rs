@@ -131,6 +131,32 @@ fn a_hook_of_the_whole_site_is_notified_of_a_red_of_the_past_too() {
     site.proven_events();
 }
 
+/// A benchmark that is added with its history while others are watched: its newest reading is judged first, and the refits of its
+/// past keep nothing else waiting.
+#[test]
+fn the_history_of_a_benchmark_that_is_added_is_taken_as_on_a_first_start() {
+    let site = history();
+    let program = site.caught_up();
+    let all = (BENCHMARKS * (ROWS - 9)) as usize;
+    eventually("all refits of the past", || refits(&site).len() == all);
+    let added = fs::read_to_string(site.path("incoming/0.csv")).unwrap();
+    fs::write(site.path("added.csv"), &added).unwrap();
+    fs::rename(site.path("added.csv"), site.path("incoming/added.csv")).unwrap();
+    let of_added = || {
+        let made = refits(&site).into_iter();
+        let of_added = made.filter(|(benchmark, _)| benchmark == "added");
+        of_added.map(|(_, time)| time).collect::<Vec<_>>()
+    };
+    let expected = (ROWS - 9) as usize;
+    eventually("all refits of the one that was added", || {
+        of_added().len() == expected
+    });
+    let (newest, _) = added.lines().last().unwrap().split_once(',').unwrap();
+    assert_eq!(of_added()[0], newest);
+    program.stop();
+    site.proven_events();
+}
+
 /// A file with a row and its correction, read again; and a row that is corrected back.
 #[test]
 fn a_row_and_its_correction_that_are_read_again_are_taken_once_and_a_value_corrected_back_counts() {

@@ -140,6 +140,52 @@ fn a_past_in_which_the_current_is_judged_meanwhile_gives_no_other_refits() {
     assert_eq!(made, refits(&given));
 }
 
+/// The history of one benchmark that is added while another is watched.
+#[test]
+fn the_past_of_one_benchmark_alone_is_taken_without_keeping_the_others_from_being_judged() {
+    let inputs = history(60, |_| 0.0);
+    let id = BenchmarkId::new("b");
+    let is_added =
+        |input: &Input| matches!(input, Input::Reading { benchmark, .. } if *benchmark == id);
+    let (added, watched): (Vec<_>, Vec<_>) =
+        (inputs.into_iter()).partition(|(_, input)| is_added(input));
+    let (live, before) = (watched[50..].iter(), watched[..50].iter());
+    let mut late = monitor();
+    let mut said: Vec<Event> = before
+        .flat_map(|(now, input)| late.step(*now, input))
+        .collect();
+    late.step(at(49), &Input::Notice(Notice::PastOf(id.clone())));
+    let (mut live, mut while_read) = (live, Vec::new());
+    for (number, (_, input)) in added.iter().enumerate() {
+        if number % 6 == 0
+            && let Some((now, input)) = live.next()
+        {
+            while_read.extend(late.step(*now, input));
+        }
+        while_read.extend(late.step(at(59), input));
+    }
+    let of = |refits: &[(String, Timestamp, String)], benchmark: &str| {
+        refits.iter().filter(|(one, ..)| one == benchmark).count()
+    };
+    assert_eq!(of(&refits(&while_read), "a"), 10, "judged as they come");
+    assert_eq!(of(&refits(&while_read), "b"), 0);
+    let mut restored = Monitor::restore(&late.save().unwrap()).unwrap();
+    assert!(restored.reads_past() && !restored.reads_all_past());
+    let now = at(59);
+    let current = restored.step(now, &Input::Notice(Notice::Current));
+    let newest: Vec<_> = refits(&current)
+        .into_iter()
+        .map(|(one, time, _)| (one, time))
+        .collect();
+    assert_eq!(newest, [("b".to_owned(), at(59))]);
+    said.extend([while_read, current].concat());
+    while restored.owes_past() {
+        said.extend(restored.step(now, &Input::Notice(Notice::Retrace)));
+    }
+    let (_, given) = as_it_came(&history(60, |_| 0.0));
+    assert_eq!(refits(&said), refits(&given));
+}
+
 #[test]
 fn a_red_of_the_past_that_nothing_has_ended_is_called_after_a_first_start_as_of_then() {
     // Ten hours of 240 mm/day, and twenty of creep: not yet an evacuation time.

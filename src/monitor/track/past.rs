@@ -208,7 +208,7 @@ impl Track {
         };
         let benchmark = self.record.benchmark();
         let text = format!(
-            "benchmark {benchmark}: {level} since {since}, found in the readings from before the first start; nothing since has \
+            "benchmark {benchmark}: {level} since {since}, found in the readings from before it was watched; nothing since has \
              ended it"
         );
         let kind = EventKind::Alert {

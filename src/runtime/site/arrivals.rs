@@ -130,6 +130,7 @@ impl Site {
         {
             events.extend(self.step(now, &Input::Found(finding)));
         }
+        self.begin_past(arrival, wall);
         events.extend(self.step(now, &arrival.input));
         events.extend(self.compare_with_clock(arrival, now, wall));
         for job in self.monitor.searches() {

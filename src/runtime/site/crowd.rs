@@ -1,9 +1,12 @@
-//! Whether messages come in such a crowd that they are a broker's backlog: on a first start they belong to the past, later
-//! they are judged together.
+//! What comes faster than it can be judged: a crowd of messages, which are a broker's backlog (on a first start they belong to the
+//! past, later they are judged together), and the history of a benchmark that begins while others are watched.
 
 use super::Site;
 use crate::monitor::{Event, Input, Notice};
+use crate::reading::Timestamp;
 use crate::runtime::clock::Stopwatch;
+use crate::runtime::tail::Arrival;
+use jiff::SignedDuration;
 use std::time::Duration;
 
 /// So many messages within [`WINDOW`] are a crowd.
@@ -17,6 +20,9 @@ const LONGEST_QUEUE: Duration = Duration::from_secs(2);
 /// So many values that queued are judged sooner. In [`LONGEST_QUEUE`] some 100,000 are taken; each judgement in between refits
 /// every benchmark once more.
 const MOST_QUEUED: u64 = 131_072;
+
+/// A benchmark whose first reading is older than this has a history.
+const HISTORY: SignedDuration = SignedDuration::from_hours(24);
 
 /// How fast messages came of late.
 #[derive(Debug, Default)]
@@ -49,7 +55,7 @@ impl Site {
 
     /// Where messages come in a crowd, what they hold from here on is judged at [`Site::end_batch`].
     pub fn queue(&mut self) {
-        if self.monitor.queues() || self.monitor.reads_past() || !self.comes_crowded() {
+        if self.monitor.queues() || self.monitor.reads_all_past() || !self.comes_crowded() {
             return;
         }
         self.crowd.queues = Some((Stopwatch::start(), self.counts.taken));
@@ -73,19 +79,46 @@ impl Site {
     pub fn judge_meanwhile(&mut self) -> Vec<Event> {
         let mut events = Vec::new();
         if !self.monitor.reads_past() {
+            self.crowd.reads_past = None;
             return events;
         }
         let since = *self.crowd.reads_past.get_or_insert_with(Stopwatch::start);
         if since.elapsed() < LONGEST {
             return events;
         }
+        let of: Vec<_> = self.monitor.past_is_read_of().cloned().collect();
+        let is_of_all = self.monitor.reads_all_past();
         while self.monitor.owes_current() {
             events.extend(self.judge_current());
         }
         self.crowd.reads_past = None;
         let now = self.data_now();
-        self.step(now, &Input::Notice(Notice::Past));
+        let again = if is_of_all {
+            vec![Notice::Past]
+        } else {
+            of.into_iter().map(Notice::PastOf).collect()
+        };
+        for notice in again {
+            self.step(now, &Input::Notice(notice));
+        }
         events
+    }
+
+    /// The first reading of a benchmark that belongs to a history: this is taken as on a first start, without the others, which
+    /// are judged as before, having to wait until each of its readings has been judged.
+    pub(super) fn begin_past(&mut self, arrival: &Arrival, wall: Timestamp) {
+        let Input::Reading { benchmark, .. } = &arrival.input else {
+            return;
+        };
+        if self.sinks.store.is_none()
+            || self.monitor.reads_all_past()
+            || self.monitor.level(benchmark).is_some()
+            || self.keeper.now(wall).duration_since(arrival.time) <= HISTORY
+        {
+            return;
+        }
+        let notice = Notice::PastOf(benchmark.clone());
+        self.step(self.data_now(), &Input::Notice(notice));
     }
 
     /// Whether more are to be expected at once.

@@ -14,6 +14,7 @@ pub use order::{Asked, OrderError};
 pub use site::{SiteView, Standing};
 
 use super::clock;
+use super::vitals::Vitals;
 use crate::config::{Config, Links};
 use crate::monitor::{Declared, SiteLevel, Watched};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -107,6 +108,8 @@ pub struct SiteReader {
     /// A connection of its own: a long answer keeps the work loop from nothing.
     store: Store,
     facts: RwLock<Arc<Facts>>,
+    /// What the daemon that shows it knows of itself; nothing where none does.
+    vitals: Option<Arc<Vitals>>,
 }
 
 impl SiteReader {
@@ -117,7 +120,20 @@ impl SiteReader {
     pub fn open(folder: &Path, facts: Facts) -> Result<Self, StoreError> {
         let store = Store::look(folder)?;
         let facts = RwLock::new(Arc::new(facts));
-        Ok(Self { store, facts })
+        Ok(Self {
+            store,
+            facts,
+            vitals: None,
+        })
+    }
+
+    /// The same, beside the daemon whose health this is: while it cannot write the state, the levels that it has called are shown.
+    #[must_use]
+    pub fn of_daemon(self, vitals: Arc<Vitals>) -> Self {
+        Self {
+            vitals: Some(vitals),
+            ..self
+        }
     }
 
     /// What it shows from here on is by another config.

@@ -7,6 +7,7 @@ use crate::reading::{BenchmarkId, Timestamp};
 use crate::regime::Regime;
 use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::standing::{InForce, TakenOrders, in_force};
+use crate::runtime::vitals::VitalsPoint;
 use crate::store::StoreError;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -94,6 +95,9 @@ pub struct SiteView {
     pub silences: Vec<Event>,
     /// What was said last, newest first: alerts, faults, orders.
     pub log: Vec<Event>,
+    /// Whether the daemon cannot write the state: levels and newest readings are those that it knows, and the rest is as of the last write.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_not_written: bool,
 }
 
 impl SiteReader {
@@ -124,7 +128,20 @@ impl SiteReader {
                 .of(of_benchmarks)
                 .filter(|_| at.is_some())
         });
-        let benchmarks: Vec<Standing> = benchmarks.collect::<Result<_, _>>()?;
+        let mut benchmarks: Vec<Standing> = benchmarks.collect::<Result<_, _>>()?;
+        let unwritten = self.vitals.as_ref().filter(|vitals| {
+            let health = vitals.health();
+            at.is_none() && !health.is_store_writable && health.is_caught_up
+        });
+        let mut level = called.unwrap_or(Level::Green);
+        if let Some(vitals) = unwritten {
+            let points = vitals.points();
+            for one in &mut benchmarks {
+                one.overlay(&points, moment);
+            }
+            let of_benchmarks = benchmarks.iter().map(|one| one.level);
+            level = level.max(self.facts().level.of(of_benchmarks).unwrap_or(level));
+        }
         Ok(SiteView {
             site: self.facts().name.clone(),
             version: env!("CARGO_PKG_VERSION"),
@@ -136,7 +153,8 @@ impl SiteReader {
             collapse: self.collapse(at, now),
             positions_are: self.facts().positions_are,
             takes_orders: self.facts().takes_orders,
-            level: called.unwrap_or(Level::Green),
+            level,
+            is_not_written: unwritten.is_some(),
             unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
             benchmarks,
             acknowledged: orders.acknowledged(&levels),
@@ -218,6 +236,25 @@ impl SiteReader {
 }
 
 impl Standing {
+    /// As the daemon knows it, which could not write it.
+    fn overlay(&mut self, points: &BTreeMap<BenchmarkId, VitalsPoint>, moment: Timestamp) {
+        let Some(point) = points.get(&self.benchmark) else {
+            return;
+        };
+        if self.level != point.level {
+            (self.level, self.since) = (point.level, None);
+            if self.alarm_state == AlarmState::Normal {
+                self.alarm_state = AlarmState::Unacknowledged;
+            }
+        }
+        if self.is_unknown != point.is_unknown {
+            (self.is_unknown, self.unknown_since) = (point.is_unknown, None);
+        }
+        self.newest_reading = point.newest.max(self.newest_reading);
+        let silent = |newest| moment.duration_since(newest).as_secs().max(0);
+        self.silent_seconds = self.newest_reading.map(silent);
+    }
+
     fn forecast(&mut self, refit: &Event) {
         let EventKind::Refit {
             regime,
