@@ -21,6 +21,8 @@ pub struct AlertEvidence {
     pub settled_velocity_mm_per_day: Option<f64>,
     /// Its standard error by the readings' own, mm/day; 0 where none is known.
     pub settled_error_mm_per_day: f64,
+    /// What the slope has moved at least in the mean over the evacuation time before, mm/day; 0 where nothing stands clear of the error.
+    pub moved_at_least_mm_per_day: f64,
     /// Displacement since the first reading, mm, for benchmarks that measure it.
     pub displacement_mm: Option<f64>,
     /// Latest observed acceleration, mm/day per day.

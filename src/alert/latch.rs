@@ -207,6 +207,8 @@ impl Latch {
         let Some(velocity) = evidence.settled_velocity_mm_per_day.map(f64::abs) else {
             return;
         };
+        // A slope that moves in slips rests at most readings: it has slowed down where it has in the mean as well.
+        let velocity = velocity.max(evidence.moved_at_least_mm_per_day);
         let less = call.level < self.level;
         let error = evidence.settled_error_mm_per_day;
         // What is no larger than its error is no peak: readings that are spoilt would raise it, and then seem to slow down.

@@ -4,6 +4,7 @@ use super::args::{OutputArgs, OutputFormat};
 use super::text;
 use crate::config::{self, Config};
 use crate::monitor::EventKind;
+use crate::reading::BenchmarkId;
 use crate::store::Store;
 use anyhow::Context;
 use clap::builder::PossibleValuesParser;
@@ -86,12 +87,27 @@ pub(super) fn backup(args: &BackupArgs) -> anyhow::Result<()> {
     })
 }
 
+/// Whether there is, or was, a benchmark of this name.
+fn is_known(config: &Config, store: &Store, benchmark: &str) -> anyhow::Result<bool> {
+    let id = BenchmarkId::new(benchmark);
+    Ok(config.settings.watched.named.contains(&id)
+        || store.benchmarks()?.contains_key(&id)
+        || !store.events(0, None, Some(benchmark))?.is_empty())
+}
+
 /// Prints events.
 pub(super) fn events(args: &EventsArgs) -> anyhow::Result<()> {
     let (config, store) = args.site.open()?;
     let zone = &config.site.time_zone;
     let mut stdout = std::io::stdout().lock();
     let mut after = 0;
+    if let Some(benchmark) = args.benchmark.as_ref().filter(|_| !args.follow)
+        && !is_known(&config, &store, benchmark)?
+    {
+        anyhow::bail!(
+            "there is no benchmark {benchmark}: the config names none, and none has given a reading"
+        );
+    }
     loop {
         let events = store.events(after, args.kind.as_deref(), args.benchmark.as_deref())?;
         for (seq, body) in &events {

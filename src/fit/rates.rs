@@ -85,8 +85,18 @@ const CLEAR_OF_NOISE: f64 = 6.0;
 /// No merged interval is longer than this share of the record, so that a slow slope keeps some.
 const LONGEST_SHARE: f64 = 1.0 / 16.0;
 
-/// Noise floor of a displacement series without scatter: the resolution of its own digits, mm.
+/// Noise floor of a displacement series without scatter, mm.
 const LEAST_DISPLACEMENT_SIGMA_MM: f64 = 1e-3;
+/// Readings have a resolution that shows where at least this share of the steps between them is none, and where of the others at least
+/// this share are multiples of the shortest one.
+const WITHOUT_STEP: f64 = 1.0 / 3.0;
+const MULTIPLES: f64 = 0.9;
+/// So near to a multiple of the shortest step.
+const NEAR_MULTIPLE: f64 = 1e-3;
+/// Steps smaller than this are rounding of the arithmetic, mm.
+const NO_STEP_MM: f64 = 1e-6;
+/// Fewest steps by which a resolution shows.
+const FEWEST_STEPS: usize = 5;
 
 impl Observations {
     /// Displacements, mm, at times in days, without stated errors.
@@ -180,8 +190,32 @@ impl Observations {
     }
 }
 
+/// The standard error that the resolution of displacements has by itself, mm: they are rounded to multiples of it. 0 where none shows.
+fn resolution_sigma(values: &[Observation]) -> f64 {
+    let steps = values
+        .windows(2)
+        .map(|pair| (pair[1].value - pair[0].value).abs());
+    let moved: Vec<f64> = steps.filter(|step| *step > NO_STEP_MM).collect();
+    let count = values.len().saturating_sub(1) as f64;
+    let Some(shortest) = moved.iter().copied().reduce(f64::min) else {
+        return 0.0;
+    };
+    let multiples = moved.iter().filter(|step| {
+        let times = **step / shortest;
+        (times - times.round()).abs() < NEAR_MULTIPLE * times
+    });
+    let shows = moved.len() >= FEWEST_STEPS
+        && moved.len() as f64 <= (1.0 - WITHOUT_STEP) * count
+        && multiples.count() as f64 >= MULTIPLES * moved.len() as f64;
+    if shows {
+        shortest / 12.0_f64.sqrt()
+    } else {
+        0.0
+    }
+}
+
 /// The standard error of one displacement reading, mm: from how far each stands from the line between
-/// its neighbours, by the median, so that neither steps nor acceleration raise it.
+/// its neighbours, by the median, so that neither steps nor acceleration raise it; no less than rounding makes it.
 pub(crate) fn displacement_sigma(values: &[Observation]) -> f64 {
     let mut misfits: Vec<f64> = values
         .windows(3)
@@ -198,7 +232,8 @@ pub(crate) fn displacement_sigma(values: &[Observation]) -> f64 {
     let middle = misfits.len() / 2;
     let (_, median, _) = misfits.select_nth_unstable_by(middle, f64::total_cmp);
     // The median of |normal| is 0.6745 of its standard deviation.
-    (*median / 0.6745).max(LEAST_DISPLACEMENT_SIGMA_MM)
+    let least = resolution_sigma(values).max(LEAST_DISPLACEMENT_SIGMA_MM);
+    (*median / 0.6745).max(least)
 }
 
 /// Readings that are one: their mean, and how far it may be off.
@@ -346,6 +381,31 @@ mod tests {
         for rate in &rates {
             assert!((rate.velocity - 0.1).abs() < 4.0 * rate.sigma, "{rate:?}");
         }
+    }
+
+    /// Centimetres of a slope that moves less between two readings: most steps are none, and the others are no scatter.
+    #[test]
+    fn readings_of_a_coarse_resolution_scatter_by_it() {
+        let coarse = |t: f64, resolution: f64| (10.0 * t / resolution).round() * resolution;
+        let values = |resolution: f64| {
+            let values = (0..400_u32).map(|hour| f64::from(hour) / 24.0);
+            displacement(
+                &values
+                    .map(|t| (t, coarse(t, resolution)))
+                    .collect::<Vec<_>>(),
+            )
+        };
+        let expected = 10.0 / 12.0_f64.sqrt();
+        let found = displacement_sigma(&values(10.0).values);
+        assert!((found / expected - 1.0).abs() < 0.01, "{found}");
+        let rates = values(10.0).rates(0..400, RateOptions::default());
+        assert!(rates.iter().all(|rate| rate.velocity < 30.0), "{rates:?}");
+        // Smooth motion and a single step of a slope at rest have none.
+        assert!(displacement_sigma(&values(1e-6).values) < 0.01);
+        let step: Vec<(f64, f64)> = (0..50_u32)
+            .map(|i| (f64::from(i), if i < 25 { 0.0 } else { 10.0 }))
+            .collect();
+        assert!(displacement_sigma(&displacement(&step).values) < 0.01);
     }
 
     #[test]

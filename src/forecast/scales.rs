@@ -15,6 +15,9 @@ const MOST_BLOCKS: usize = 512;
 const MOST_SCALES: usize = 24;
 /// Fewest readings.
 const FEWEST_READINGS: usize = 6;
+/// So many of the newest spans between readings say how a slope is read now, where they are shorter than this share of the usual one.
+const SPANS_NOW: usize = 24;
+const OFTENER: f64 = 0.25;
 /// A change is never known better than this, mm.
 const LEAST_CHANGE_MM: f64 = 1e-4;
 /// The usual change of the next shorter scale counts as much as so many observed ones.
@@ -166,6 +169,12 @@ impl Scales {
     }
 }
 
+/// The upper one of the two middle ones of an even number; `values` are not empty.
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 /// What a change of displacements of the stated standard error is, mm; 0 where none is stated.
 fn stated_change(quantity: Quantity, values: &[Observation]) -> f64 {
     let mut stated: Vec<f64> = values.iter().filter_map(|value| value.sigma).collect();
@@ -208,10 +217,11 @@ impl Curve {
     }
 
     fn interval(&self) -> f64 {
-        let newest = self.days.windows(2).rev().take(SPANS);
-        let mut spans: Vec<f64> = newest.map(|pair| pair[1] - pair[0]).collect();
-        let middle = spans.len() / 2;
-        *spans.select_nth_unstable_by(middle, f64::total_cmp).1
+        let spans = self.days.windows(2).rev().map(|pair| pair[1] - pair[0]);
+        let mut spans: Vec<f64> = spans.take(SPANS).collect();
+        let mut now = spans[..spans.len().min(SPANS_NOW)].to_vec();
+        let (usual, now) = (median(&mut spans), median(&mut now));
+        if now < OFTENER * usual { now } else { usual }
     }
 
     /// To be asked about ever earlier times, from `days` on.

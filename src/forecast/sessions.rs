@@ -12,20 +12,46 @@ pub(super) const SPANS: usize = 256;
 const FEWEST: usize = 6;
 /// Most rounds of a session: more of them, as in working hours, show motion.
 const MOST_ROUNDS: usize = 16;
-/// A session lasts no longer than this share of the pause after it.
+/// A session lasts no longer than this share of a pause.
 const LASTS: f64 = 0.125;
+/// The newest session, which may be going on, has at most so many times the rounds of the largest one before, and lasts at most so many
+/// times as long as the longest: a slope that is read more often from now on is not in a session.
+const AS_BEFORE: u32 = 2;
+
+/// How sessions show among readings.
+#[derive(Debug, Clone, Copy)]
+struct SessionPattern {
+    /// Spans of so many days or more part two sessions: longer than that between two rounds and shorter than a pause.
+    least_pause: f64,
+    /// So many days a session lasts at most.
+    longest: f64,
+}
 
 /// The means of the sessions, oldest first; the readings as they are where they were not taken in sessions.
 pub(super) fn merged(values: &[Observation]) -> Cow<'_, [Observation]> {
-    let Some(pause) = least_pause(values) else {
+    let Some(pattern) = pattern(values) else {
         return Cow::Borrowed(values);
     };
-    let sessions = values.chunk_by(|a, b| b.t_days - a.t_days < pause);
-    Cow::Owned(sessions.map(mean).collect())
+    let groups = values.chunk_by(|a, b| b.t_days - a.t_days < pattern.least_pause);
+    let mut means = Vec::with_capacity(values.len());
+    let (mut most_rounds, mut longest) = (1, 0.0_f64);
+    let mut groups = groups.peekable();
+    while let Some(group) = groups.next() {
+        let lasted = group[group.len() - 1].t_days - group[0].t_days;
+        let is_as_before = group.len() <= AS_BEFORE as usize * most_rounds
+            && lasted <= f64::from(AS_BEFORE) * longest;
+        let is_usual = groups.peek().is_some() || group.len() == 1 || is_as_before;
+        if group.len() <= MOST_ROUNDS && lasted <= pattern.longest && is_usual {
+            (most_rounds, longest) = (most_rounds.max(group.len()), longest.max(lasted));
+            means.push(mean(group));
+        } else {
+            means.extend_from_slice(group);
+        }
+    }
+    Cow::Owned(means)
 }
 
-/// What parts two sessions, days: longer than the span between two rounds and shorter than a pause.
-fn least_pause(values: &[Observation]) -> Option<f64> {
+fn pattern(values: &[Observation]) -> Option<SessionPattern> {
     let newest = &values[values.len().saturating_sub(SPANS + 1)..];
     let spans = newest
         .windows(2)
@@ -40,8 +66,11 @@ fn least_pause(values: &[Observation]) -> Option<f64> {
     let usual_pause = *pauses.get(pauses.len() / 2)?;
     let is_often = 2 * rounds >= pauses.len() && rounds < MOST_ROUNDS * pauses.len();
     let lasts = longest_round * (rounds as f64 / pauses.len() as f64);
-    (pauses.len() + 1 >= FEWEST && is_often && lasts <= LASTS * usual_pause)
-        .then(|| (longest_round * pause).sqrt())
+    let longest = LASTS * usual_pause;
+    (pauses.len() + 1 >= FEWEST && is_often && lasts <= longest).then(|| SessionPattern {
+        least_pause: (longest_round * pause).sqrt(),
+        longest,
+    })
 }
 
 fn mean(session: &[Observation]) -> Observation {
@@ -110,6 +139,29 @@ mod tests {
             one.t_days += (index / 50) as f64 * 3.0;
         }
         assert_eq!(merged(&with_outages).len(), with_outages.len());
+    }
+
+    /// As when it gets serious: surveys each month, and then a reading each hour.
+    #[test]
+    fn readings_that_come_more_often_from_now_on_are_no_session() {
+        for (surveys, apart) in [(24, 30.0), (60, 30.0), (60, 7.0), (40, 1.0)] {
+            let mut values = sessions(surveys, 1, apart, 0.0);
+            for hour in 1..=200 {
+                let last = values[values.len() - 1];
+                let t_days = last.t_days + 1.0 / 24.0;
+                values.push(Observation { t_days, ..last });
+                let kept = merged(&values);
+                assert_eq!(kept.len(), values.len(), "{surveys} {apart} {hour}");
+            }
+        }
+        // The same after sessions of three rounds.
+        let mut values = sessions(40, 3, 1.0, 4.0);
+        for hour in 1..=48 {
+            let last = values[values.len() - 1];
+            let t_days = last.t_days + 1.0 / 24.0;
+            values.push(Observation { t_days, ..last });
+            assert!(merged(&values).len() >= 40 + hour, "{hour}");
+        }
     }
 
     #[test]

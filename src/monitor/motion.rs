@@ -1,7 +1,7 @@
 //! What the newest rates show by themselves.
 
 use crate::alert::AlertEvidence;
-use crate::fit::{Observations, Rate};
+use crate::fit::{Observation, Observations, Rate, displacement_sigma};
 use crate::reading::{Quantity, Timestamp};
 
 /// The line goes through this share of the rates, newest last, and no fewer than [`FEWEST_IN_LINE`].
@@ -9,6 +9,12 @@ const LINE_SHARE: f64 = 0.25;
 const FEWEST_IN_LINE: usize = 8;
 /// Rates whose median is the settled velocity.
 const SETTLED: usize = 5;
+/// Readings are looked at no further back than this for how they scatter.
+const LOOKED_AT: usize = 512;
+/// A mean that stands clear of zero does so by so many standard errors.
+const CLEAR: f64 = 4.0;
+/// So many standard errors, by the scatter of the rates, a slope moves backwards where no reading states its error.
+const CLEARLY_BACK: f64 = 5.0;
 /// A settled velocity is a new highest from this factor on.
 const HIGHER: f64 = 1.25;
 
@@ -30,6 +36,8 @@ pub(super) fn moves_backwards(rates: &[Rate]) -> bool {
         && latest
             .iter()
             .all(|rate| rate.velocity < -3.0 * rate.sigma && rate.velocity < 0.0)
+        && (latest.iter().any(|rate| rate.sigma > 0.0)
+            || settled(rates).is_some_and(|now| now < -CLEARLY_BACK * settled_error(rates)))
 }
 
 /// The median of the latest rates, mm/day.
@@ -51,8 +59,57 @@ fn settled_error(rates: &[Rate]) -> f64 {
     let latest = &rates[rates.len().saturating_sub(SETTLED)..];
     let mut errors: Vec<f64> = latest.iter().map(|rate| rate.sigma).collect();
     errors.sort_by(f64::total_cmp);
-    let middle = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
-    OF_THE_MEDIAN * middle / (SETTLED as f64).sqrt()
+    let stated = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
+    let error = if stated > 0.0 {
+        stated
+    } else {
+        scatter_of(rates)
+    };
+    OF_THE_MEDIAN * error / (SETTLED as f64).sqrt()
+}
+
+/// How far velocities whose error nobody states stand from the line between their neighbours, mm/day.
+fn scatter_of(rates: &[Rate]) -> f64 {
+    let as_read = rates.iter().map(|rate| Observation {
+        t_days: rate.middle(),
+        value: rate.velocity,
+        sigma: None,
+    });
+    let as_read: Vec<Observation> = as_read.collect();
+    if as_read.len() <= SETTLED {
+        return 0.0;
+    }
+    displacement_sigma(&as_read)
+}
+
+/// What the slope has moved at least in the mean over the last `days`, mm/day: 0 where that does not stand clear of its error, and in a
+/// record that is shorter.
+fn moved_at_least(observations: &Observations, days: f64) -> f64 {
+    let values = &observations.values;
+    let Some(newest) = values.last() else {
+        return 0.0;
+    };
+    let before = values.partition_point(|one| one.t_days <= newest.t_days - days);
+    // Where fewer are read, the settled velocity is of a longer time.
+    let is_often = values.len() - before >= SETTLED;
+    let Some(from) = before.checked_sub(1).filter(|_| is_often) else {
+        return 0.0;
+    };
+    let scatter = displacement_sigma(&values[values.len().saturating_sub(LOOKED_AT)..]);
+    let (mean, error) = match observations.quantity {
+        Quantity::Displacement => {
+            let span = newest.t_days - values[from].t_days;
+            let moved = newest.value - values[from].value;
+            (moved / span, scatter * std::f64::consts::SQRT_2 / span)
+        }
+        Quantity::Velocity => {
+            let own = &values[before..];
+            let count = own.len() as f64;
+            let sum: f64 = own.iter().map(|one| one.value).sum();
+            (sum / count, scatter / count.sqrt())
+        }
+    };
+    (mean.abs() - CLEAR * error).max(0.0)
 }
 
 /// The highest settled velocity, mm/day.
@@ -73,11 +130,12 @@ pub(super) fn is_new_highest(rates: &[Rate]) -> bool {
     }
 }
 
-/// What `observations` up to `now` and their rates show of the motion.
+/// What `observations` up to `now` and their rates show of the motion, the newest ones and over an evacuation time.
 pub(super) fn observed(
     observations: &Observations,
     rates: &[Rate],
     now: Timestamp,
+    evacuation_days: f64,
 ) -> AlertEvidence {
     let newest = rates.last().map(|rate| rate.velocity);
     AlertEvidence {
@@ -85,6 +143,12 @@ pub(super) fn observed(
         velocity_mm_per_day: newest.or_else(|| newest_velocity(observations)),
         settled_velocity_mm_per_day: settled(rates),
         settled_error_mm_per_day: settled_error(rates),
+        // Without rates only thresholds are asked, at each reading.
+        moved_at_least_mm_per_day: if rates.is_empty() {
+            0.0
+        } else {
+            moved_at_least(observations, evacuation_days)
+        },
         displacement_mm: displacement_mm(observations),
         acceleration_mm_per_day2: acceleration(rates),
         ..AlertEvidence::default()
@@ -118,5 +182,58 @@ fn newest_velocity(observations: &Observations) -> Option<f64> {
             };
             Some((newest.value - before.value) / (newest.t_days - before.t_days))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::RateOptions;
+
+    /// Slips of 6 mm each 12 hours, read by the hour: 12 mm/day.
+    #[test]
+    fn a_slope_that_moves_in_slips_moves_in_the_mean_as_well() {
+        let noise = |hour: u32| 0.3 * f64::from(hour * 37 % 11) / 11.0;
+        let read = |hour: u32| {
+            (
+                f64::from(hour) / 24.0,
+                6.0 * f64::from(hour / 12) + noise(hour),
+            )
+        };
+        let slips = Observations::of_displacements((0..240).map(read));
+        let rates = slips.rates(0..240, RateOptions::default());
+        let least = observed(&slips, &rates, Timestamp::UNIX_EPOCH, 1.0).moved_at_least_mm_per_day;
+        assert!(least > 5.0 && least <= 12.0, "{least}");
+        let read = |hour: u32| (f64::from(hour) / 24.0, noise(hour));
+        let at_rest = Observations::of_displacements((0..240).map(read));
+        assert!(moved_at_least(&at_rest, 1.0).abs() < 1e-9);
+    }
+
+    /// Velocities of an instrument that states no error.
+    #[test]
+    fn velocities_that_scatter_about_zero_do_not_move_backwards_and_their_error_shows() {
+        let mut state = 7_u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 32) as f64 / f64::from(u32::MAX >> 1) - 1.0
+        };
+        let rate = |hour: u32, velocity: f64| Rate {
+            from: f64::from(hour) / 24.0,
+            to: f64::from(hour + 1) / 24.0,
+            velocity,
+            sigma: 0.0,
+            readings: 1,
+            error: crate::fit::ReadingError::Own,
+        };
+        let rates: Vec<Rate> = (0..2000).map(|hour| rate(hour, 17.0 * random())).collect();
+        for count in 100..rates.len() {
+            assert!(!moves_backwards(&rates[count - 96..count]), "{count}");
+        }
+        let error = settled_error(&rates[..96]);
+        assert!(error > 2.0 && error < 15.0, "{error}");
+        let back: Vec<Rate> = (0..96).map(|hour| rate(hour, -20.0 + random())).collect();
+        assert!(moves_backwards(&back));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::event::Event;
 use super::track::Track;
-use super::{Monitor, trouble};
+use super::{Monitor, Notice, trouble};
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
@@ -137,13 +137,22 @@ impl Monitor {
     pub(super) fn begin_anew(&mut self, benchmark: &BenchmarkId) -> Option<(Track, String)> {
         let why = self.anew.remove(benchmark)?;
         let former = self.benchmarks.remove(benchmark)?;
+        let is_past = self.past.is_open_of(benchmark);
         // The key of an alert that stays in force must not change; one that begins later has another beginning.
         if former.level() == Level::Green {
             self.note_dropped(benchmark);
         } else {
             self.forget_work(benchmark);
         }
+        if is_past {
+            self.past.open(&Notice::PastOf(benchmark.clone()));
+        }
         Some((former, why))
+    }
+
+    /// Whether the next reading of the benchmark is the first that means something else than those before.
+    pub fn begins_anew(&self, benchmark: &BenchmarkId) -> bool {
+        self.anew.contains_key(benchmark)
     }
 
     fn note_dropped(&mut self, id: &BenchmarkId) {

@@ -289,9 +289,11 @@ fn scatter(readings: &[(Timestamp, f64)]) -> Option<(f64, f64)> {
 }
 
 /// The usual step from one reading to the next, and how steps scatter about it, no less than the usual size of one;
-/// `None` where they do not.
+/// `None` where they do not. Values that are given twice, or are rounded, have steps of 0 between them: these say nothing of the others.
 pub fn scatter_of(steps: &[f64]) -> Option<(f64, f64)> {
+    let moved: Vec<f64> = steps.iter().copied().filter(|step| *step != 0.0).collect();
     let usual = median(steps.iter().copied())?;
+    let steps = if moved.len() < FEWEST { steps } else { &moved };
     let scatter = 1.4826 * median(steps.iter().map(|step| (step - usual).abs()))?;
     let scatter = scatter.max(median(steps.iter().map(|step| step.abs()))?);
     (scatter > 0.0).then_some((usual, scatter))

@@ -20,6 +20,8 @@ pub struct Delivered {
     ended: BTreeMap<DeliveredKey, DeliveryOutcome>,
     unwritten: Vec<(Delivery, DeliveryOutcome)>,
     store: Option<Arc<Store>>,
+    /// Whether the last ones could not be made durable, and that has been logged.
+    are_unwritten_logged: bool,
 }
 
 /// The alert as the outbox keeps it for a hook.
@@ -157,5 +159,21 @@ impl Delivered {
             self.unwritten.clear();
         }
         Ok(())
+    }
+
+    /// As [`Delivered::commit`]; that it cannot be done is logged, once until it can again.
+    pub fn commit_or_log(&mut self) {
+        match self.commit() {
+            Ok(()) if self.are_unwritten_logged => {
+                tracing::info!("the receipts of alerts are kept again");
+                self.are_unwritten_logged = false;
+            }
+            Ok(()) => {}
+            Err(_) if self.are_unwritten_logged => {}
+            Err(error) => {
+                tracing::warn!(%error, "the receipts of alerts cannot be kept: a restart may send their alerts again");
+                self.are_unwritten_logged = true;
+            }
+        }
     }
 }

@@ -75,6 +75,10 @@ fn the_readings_of_another_site_in_the_state_are_named_and_init_does_not_take_th
     ]);
     office.done(&["init", "a.csv"]);
     run(&office);
+    let events = ["events", "--config", "site.toml", "--benchmark"];
+    office.done(&[&events[..], &["P1"]].concat());
+    let said = office.refused(1, &[&events[..], &["p1"]].concat());
+    contains_all(&said, &["there is no benchmark p1"]);
     let (_, _, err) = office.say(&["check", "site.toml"]);
     assert!(!err.contains("state folder"), "{err}");
     let said = office.refused(2, &["init", "b.csv", "--force"]);
@@ -466,4 +470,43 @@ fn a_recording_that_was_cut_off_is_read_by_every_command_and_each_says_so() {
     }
     let back = fs::read_to_string(office.path("back.csv")).unwrap();
     assert_eq!(back.lines().count(), 151);
+}
+
+/// A logger that begins a file each day: each would be a benchmark of its own, and tomorrow's be followed by nothing.
+#[test]
+fn init_asks_whose_readings_files_are_that_differ_by_their_dates_alone() {
+    let rows = |day: i32| {
+        let row = |hour: i32| format!("2026-11-{day}T{hour:02}:00:00Z,{}\n", hour + 24 * day);
+        let rows: String = (0..24).map(row).collect();
+        format!("time,displacement_mm\n{rows}")
+    };
+    let days: Vec<(String, String)> = (20..23)
+        .map(|day| (format!("slope-202611{day}.csv"), rows(day)))
+        .collect();
+    let files: Vec<(&str, &str)> = days
+        .iter()
+        .map(|(name, text)| (&name[..], &text[..]))
+        .collect();
+    let office = Office::with(&files);
+    let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
+    let said = office.refused(2, &[&["init"], &names[..]].concat());
+    for part in [
+        "slope-20261120 and slope-20261121",
+        "--column NAME=slope",
+        "path = \"slope-*.csv\"",
+    ] {
+        assert!(said.contains(part), "{said}");
+    }
+    // One of them, by what the message says, and then all.
+    office.done(&[
+        "init",
+        names[0],
+        "--column",
+        "displacement_mm=slope:displacement:mm",
+    ]);
+    let config = fs::read_to_string(office.path("site.toml")).unwrap();
+    let config = config.replace("slope-20261120.csv", "slope-*.csv");
+    fs::write(office.path("site.toml"), config).unwrap();
+    let checked = office.done(&["check", "site.toml"]);
+    assert!(checked.contains("72 readings"), "{checked}");
 }

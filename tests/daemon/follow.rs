@@ -17,6 +17,7 @@ use tempfile::TempDir;
 const HEADER: &str = "time,displacement_mm\n";
 
 mod gone;
+mod rotation;
 
 struct Bench {
     folder: TempDir,

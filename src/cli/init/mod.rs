@@ -1,5 +1,6 @@
 //! `init FILE...`: from files of readings to a site file.
 
+mod dated;
 mod dialect;
 mod inherited;
 mod long;
@@ -22,7 +23,7 @@ use dialect::Written;
 use inherited::inherits_nothing;
 use jiff::SignedDuration;
 pub(super) use said::ConfigWritten;
-use said::{say_next, say_written};
+use said::{say_beside, say_next, say_written};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use unnamed::{covariates_alone, without_readings};
@@ -224,6 +225,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
             say_beside(file, &names);
         }
     }
+    problems.open.extend(dated::days_of_one(&benchmarks));
     problems.none()?;
     Ok(InitPlan {
         name: site_name(args),
@@ -246,16 +248,6 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
 
 fn in_seconds(span: SignedDuration) -> String {
     format!("{}s", span.as_secs())
-}
-
-/// Says of a file that no point is watched by it.
-fn say_beside(file: &Path, covariates: &[String]) {
-    exit::complain(&format_args!(
-        "{}: it is taken for covariates alone ({}), as a source without benchmarks; if one of them has the readings of a point, \
-         say so with --column",
-        file.display(),
-        covariates.join(", ")
-    ));
 }
 
 /// `1h` of an hour.

@@ -2,6 +2,7 @@
 
 use super::{Args, InitPlan};
 use crate::cli::args::OutputFormat;
+use crate::cli::exit;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::io::Write as _;
@@ -108,4 +109,14 @@ fn next(args: &Args) -> Vec<(String, &'static str)> {
         "how the site stands, while it runs",
     ));
     next
+}
+
+/// Says of a file that no point is watched by it.
+pub(super) fn say_beside(file: &Path, covariates: &[String]) {
+    exit::complain(&format_args!(
+        "{}: it is taken for covariates alone ({}), as a source without benchmarks; if one of them has the readings of a point, \
+         say so with --column",
+        file.display(),
+        covariates.join(", ")
+    ));
 }

@@ -285,9 +285,7 @@ impl Dispatcher {
 
     /// Makes the receipts durable that are not yet, as those that found no room on the disk before.
     pub fn commit(&self) {
-        if let Err(error) = locked(&self.delivered).commit() {
-            tracing::warn!(%error, "receipts lost: a restart may send their alerts again");
-        }
+        locked(&self.delivered).commit_or_log();
     }
 
     /// What `alert` supersedes or resolves is not tried again, whether a hook is notified of `alert` or not.

@@ -104,7 +104,7 @@ impl Site {
         events
     }
 
-    /// The first reading of a benchmark that belongs to a history: this is taken as on a first start, without the others, which
+    /// The first reading of a benchmark that belongs to a history, or the first again: this is taken as on a first start, without the others, which
     /// are judged as before, having to wait until each of its readings has been judged.
     pub(super) fn begin_past(&mut self, arrival: &Arrival, wall: Timestamp) {
         let Input::Reading { benchmark, .. } = &arrival.input else {
@@ -112,7 +112,7 @@ impl Site {
         };
         if self.sinks.store.is_none()
             || self.monitor.reads_all_past()
-            || self.monitor.level(benchmark).is_some()
+            || (self.monitor.level(benchmark).is_some() && !self.monitor.begins_anew(benchmark))
             || self.keeper.now(wall).duration_since(arrival.time) <= HISTORY
         {
             return;

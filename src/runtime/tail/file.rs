@@ -2,11 +2,11 @@
 
 use super::decode::{Arrival, Decoder};
 use super::position::{FileId, Saved};
-use super::records::{self, Channels, HEADER_BYTES, MAGIC, NextRecord, RawMessage};
+use super::records::Channels;
 use super::text::{BadLine, LinesRead, TextReader, Unpacking};
 use crate::reading::Timestamp;
 use crate::runtime::clock::Stopwatch;
-use crate::runtime::ingest::{IngestError, Item, decode_message, is_packed};
+use crate::runtime::ingest::{IngestError, Item, is_packed};
 use crate::runtime::site::is_logged;
 use std::collections::VecDeque;
 use std::fs::{File, Metadata};
@@ -49,6 +49,8 @@ pub(super) struct FileTail {
     pub(super) changed: Option<Timestamp>,
     pub(super) pending: VecDeque<Arrival>,
     pub(super) quarantined: u64,
+    /// The lines of the header of the file that stood under its name before.
+    pub(super) header_before: Vec<String>,
     /// The last error, so that it is logged once.
     pub(super) trouble: Option<String>,
     /// It is held open, perhaps, so that it can be read wherever it goes.
@@ -143,6 +145,7 @@ impl FileTail {
             changed: None,
             pending: VecDeque::new(),
             quarantined: 0,
+            header_before: Vec::new(),
             trouble: None,
             held: None,
             departed: None,
@@ -268,6 +271,7 @@ impl FileTail {
             } else {
                 tracing::info!(file = %self.path.display(), at = self.at, "another file: read from its start");
             }
+            self.header_before = self.header();
             self.content = Content::of(&self.decoder, &self.origin);
             self.at = 0;
         }
@@ -321,6 +325,11 @@ impl FileTail {
         self.at += count as u64;
         if let Content::Text(text) = &mut self.content {
             let fed = text.feed(&buffer[..count]);
+            if let Some(reader) = self.without_header(&fed) {
+                self.content = Content::Text(Box::new(reader));
+                self.at = 0;
+                return self.read_text(file);
+            }
             self.take(fed);
         }
         Ok(())
@@ -373,7 +382,7 @@ impl FileTail {
         }
     }
 
-    fn expect(&mut self, item: Item) {
+    pub(super) fn expect(&mut self, item: Item) {
         if let Some(arrival) = self.decoder.arrival(item) {
             self.newest = self.newest.max(Some(arrival.time));
             self.pending.push_back(arrival);
@@ -400,94 +409,10 @@ impl FileTail {
         }
     }
 
-    fn refuse(&mut self, error: &dyn std::error::Error) {
+    pub(super) fn refuse(&mut self, error: &dyn std::error::Error) {
         self.quarantined += 1;
         tracing::warn!(file = %self.path.display(), %error, "file refused until it is replaced");
         self.content = Content::Refused(error.to_string());
-    }
-
-    fn read_record(&mut self, file: &File, size: u64) -> io::Result<()> {
-        if self.at == 0 {
-            return self.read_magic(file, size);
-        }
-        if size < self.at + HEADER_BYTES as u64 {
-            return Ok(());
-        }
-        let mut header = [0; HEADER_BYTES];
-        file.read_exact_at(&mut header, self.at)?;
-        let body_at = self.at + HEADER_BYTES as u64;
-        match records::frame(header, size - body_at) {
-            NextRecord::Wait => {}
-            NextRecord::Skip { length } => self.at = body_at + length,
-            NextRecord::Read { opcode, length } => {
-                let body = read_at(file, body_at, length)?;
-                let end = body_at + length;
-                self.take_record(opcode, &body, end, end == size);
-            }
-            NextRecord::End => {
-                tracing::info!(file = %self.path.display(), "recording complete");
-                self.content = Content::Complete;
-            }
-            NextRecord::Damaged { length } => {
-                let error = io::Error::other(format!("a record of {length} bytes at {}", self.at));
-                self.refuse(&error);
-            }
-        }
-        Ok(())
-    }
-
-    fn read_magic(&mut self, file: &File, size: u64) -> io::Result<()> {
-        let length = MAGIC.len() as u64;
-        if size >= length {
-            if read_at(file, 0, length)? == MAGIC {
-                self.at = length;
-            } else {
-                self.refuse(&io::Error::other("not an MCAP file"));
-            }
-        }
-        Ok(())
-    }
-
-    fn take_record(&mut self, opcode: u8, body: &[u8], end: u64, is_last: bool) {
-        let Content::Mcap { channels, suspect } = &mut self.content else {
-            return;
-        };
-        match channels.decode(opcode, body) {
-            Ok(messages) => {
-                self.at = end;
-                for message in messages {
-                    self.take_message(&message);
-                }
-            }
-            Err(_) if is_last && *suspect != Some(self.at) => *suspect = Some(self.at),
-            Err(error) => {
-                self.quarantined += 1;
-                let (file, offset, total) = (self.path.display(), self.at, self.quarantined);
-                if is_logged(total) {
-                    tracing::warn!(%file, offset, %error, total, "record quarantined");
-                }
-                self.at = end;
-            }
-        }
-    }
-
-    fn take_message(&mut self, message: &RawMessage) {
-        let RawMessage {
-            topic,
-            metadata,
-            publish_time,
-            payload,
-        } = message;
-        match decode_message(topic, metadata, *publish_time, payload) {
-            Ok(item) => item.into_iter().for_each(|item| self.expect(item)),
-            Err(error) => {
-                self.quarantined += 1;
-                let (file, total) = (self.path.display(), self.quarantined);
-                if is_logged(total) {
-                    tracing::warn!(%file, %error, total, "message quarantined");
-                }
-            }
-        }
     }
 }
 

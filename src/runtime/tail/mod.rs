@@ -16,9 +16,11 @@ mod gap;
 mod known;
 pub mod lines;
 mod position;
+mod recording;
 pub mod records;
 mod reorder;
 mod rescan;
+mod rotation;
 mod saved;
 mod text;
 

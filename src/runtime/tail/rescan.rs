@@ -1,7 +1,8 @@
 //! Looks for files that have come or gone.
 //!
 //! A file is known by its number and by what was read of it last, not by its name: one that is no longer under its name
-//! is read on wherever it is, but never where a source asks for it by another name, as it is read there.
+//! is read on wherever it is. Where a source asks for it by another name it is read there from its start, as what that name says, unless
+//! a rotation has given it that name: it is then what it was.
 
 use super::decode::Decoder;
 use super::departed::Departure;
@@ -9,13 +10,13 @@ use super::file::FileTail;
 use super::follow::{FileKey, Followed, Follower, name};
 use super::position::FileId;
 use super::reorder::Forgotten;
+use super::rotation::is_rotated_name;
 use crate::config::FilePattern;
 use crate::store::Position;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Files that are read on after they have gone; beyond, those are closed that were written to longest ago.
 const MOST_DEPARTED: usize = 64;
@@ -26,6 +27,8 @@ struct Listing {
     files: BTreeMap<FileKey, FileId>,
     /// A path of each.
     paths: BTreeMap<FileId, PathBuf>,
+    /// The files that were followed before the folders were listed.
+    known: BTreeSet<FileId>,
     /// Sources whose folders are there and could not be listed.
     unlisted: BTreeSet<usize>,
 }
@@ -36,6 +39,19 @@ enum GoneFile {
     Moves(FileKey),
     /// It is read no more; what may be missing of it is said, if anything.
     Closed(Option<&'static str>),
+}
+
+impl Listing {
+    /// Whether a rotation has given the file its new name `to`: another file, that nobody knew, stands under its first name, or the new
+    /// name says so.
+    fn is_rotated(&self, file: &FileTail, to: &FileKey) -> bool {
+        if self.files.get(to) != file.place.as_ref() {
+            return false;
+        }
+        let successor = self.files.get(&(to.0, file.origin.clone()));
+        successor.is_some_and(|place| !self.known.contains(place))
+            || is_rotated_name(&file.origin, &to.1)
+    }
 }
 
 impl Followed {
@@ -55,7 +71,9 @@ impl Followed {
 impl Follower {
     /// Looks for files that have come or gone.
     pub(super) fn rescan(&mut self) {
-        let listing = self.list();
+        let mut listing = self.list();
+        listing.known = self.places();
+        let mut renamed = self.first_names();
         let sources = &self.sources;
         let may_be_there = |key: &FileKey, file: &FileTail| {
             let is_unlisted = listing.unlisted.contains(&key.0) && file.origin == file.path;
@@ -95,12 +113,11 @@ impl Follower {
             self.move_file(&from, to, file, &forgotten);
         }
         self.make_room();
+        renamed.extend(self.first_names());
         for key in listing.files.into_keys() {
             if !self.files.contains_key(&key) {
                 tracing::info!(file = %key.1.display(), "followed");
-                let source = &self.sources[key.0];
-                let decoder = Arc::clone(&source.decoder);
-                let file = FileTail::new(key.1.clone(), decoder);
+                let file = self.newly_followed(&key, &renamed);
                 self.files.insert(key, file);
             }
         }
@@ -111,12 +128,13 @@ impl Follower {
             return without_trace(key, file);
         }
         let listed = file.place.and_then(|place| listing.paths.get(&place));
-        if listed.is_some_and(|path| file.is_at(path)) {
-            let first = (key.0, file.origin.clone());
+        if let Some(path) = listed.filter(|path| file.is_at(path)) {
+            let (first, to) = ((key.0, file.origin.clone()), (key.0, path.clone()));
             let is_back = listing.files.get(&first) == file.place.as_ref();
-            return if is_back && !self.files.contains_key(&first) {
+            let to = if is_back { first } else { to };
+            return if (is_back || listing.is_rotated(file, &to)) && !self.files.contains_key(&to) {
                 file.departed = None;
-                GoneFile::Moves(first)
+                GoneFile::Moves(to)
             } else {
                 // Read there, from its start.
                 GoneFile::Closed(None)
@@ -171,8 +189,10 @@ impl Follower {
         let (was, now) = (from.1.display(), to.1.display());
         if file.departed.is_some() {
             tracing::info!(file = %was, %now, "gone from its name, and read on for as long as it grows");
-        } else {
+        } else if to.1 == file.origin {
             tracing::info!(file = %was, %now, "back under its name, and read on");
+        } else {
+            tracing::info!(file = %was, %now, "renamed by a rotation, and read on as what it was");
         }
         file.rename(&to.1);
         self.files.insert(to, file);
@@ -264,7 +284,9 @@ fn without_trace(key: &FileKey, file: &FileTail) -> GoneFile {
     } else {
         "gone, and not found again"
     };
-    GoneFile::Closed(file.is_lost(&key.1).then_some(what))
+    // An export replaces its file as a whole: what was read of the old one stands in the new one, under its first name.
+    let is_lost = file.is_lost(&key.1) && !file.goes_on(&file.origin);
+    GoneFile::Closed(is_lost.then_some(what))
 }
 
 /// Files, and what has a name that is no text.

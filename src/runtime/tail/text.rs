@@ -51,6 +51,21 @@ impl TextReader {
         }
     }
 
+    /// A reader of a text that goes on below these lines of a header, which stand in another file.
+    pub(super) fn below(mut rows: TextRows, header: &[String]) -> Option<Self> {
+        for (number, line) in (1..).zip(header) {
+            if rows.take(number, line).fault.is_some() {
+                return None;
+            }
+        }
+        (!rows.is_lost()).then(|| Self::new(rows))
+    }
+
+    /// The lines of the header in force.
+    pub(super) fn header(&self) -> &[String] {
+        self.rows.header()
+    }
+
     pub(super) fn saved(&self) -> SavedText {
         SavedText {
             lines: self.lines.clone(),

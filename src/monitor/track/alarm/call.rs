@@ -27,7 +27,7 @@ impl Alarm {
         let ahead = LookAhead::of(policy, forecast);
         let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
         let attention = (self.attention_until).filter(|(until, _)| time < *until);
-        let mut evidence = ahead.evidence(policy, forecast, beside.evidence(time, rates));
+        let mut evidence = ahead.evidence(policy, forecast, beside.evidence(policy, time, rates));
         evidence.causes = attention.map(|(_, cause)| cause).into_iter().collect();
         let mut events: Vec<Event> = Vec::new();
         // Until it moves forward again: one reading more or less does not change the matter.
@@ -35,7 +35,8 @@ impl Alarm {
         let was_backwards = std::mem::replace(&mut self.backwards, still || moves_backwards(rates));
         if self.backwards && !was_backwards {
             let text = format!(
-                "benchmark {} moves upslope: is the sign of its readings right?",
+                "benchmark {} moves upslope: is the sign of its readings right? Where they fall as it moves downslope, \
+                 components = [\"COLUMN\"] and direction = [-1] in its [[benchmark]] say so",
                 record.benchmark()
             );
             events.push(record.fault(time, "moves-backwards", text));
@@ -115,7 +116,7 @@ impl Alarm {
         if former.thresholds == policy.thresholds && former.rules == policy.rules {
             return None;
         }
-        let evidence = beside.evidence(time, &beside.record.history().rates());
+        let evidence = beside.evidence(policy, time, &beside.record.history().rates());
         let is_more = policy.call(&evidence).level > former.call(&evidence).level;
         is_more.then(|| self.raise(beside, policy, time)).flatten()
     }
@@ -135,9 +136,9 @@ impl Alarm {
         // The rates are those of the whole record: only where they can matter.
         let needs_rates = policy.needs_rates();
         let mut evidence = if needs_rates {
-            beside.evidence(time, &record.history().rates())
+            beside.evidence(policy, time, &record.history().rates())
         } else {
-            beside.evidence(time, &[])
+            beside.evidence(policy, time, &[])
         };
         self.held.update(policy, &mut evidence);
         if policy.call(&evidence).level <= self.latch.level() {
@@ -146,7 +147,7 @@ impl Alarm {
         if !needs_rates {
             evidence = AlertEvidence {
                 due: evidence.due,
-                ..beside.evidence(time, &record.history().rates())
+                ..beside.evidence(policy, time, &record.history().rates())
             };
         }
         let change = self.latch.raise(policy, &evidence)?;

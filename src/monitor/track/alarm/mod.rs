@@ -53,10 +53,15 @@ pub(super) struct BesideForecast<'a> {
 
 impl BesideForecast<'_> {
     /// What the readings up to `time`, of these rates, show by themselves.
-    fn evidence(&self, time: Timestamp, rates: &[Rate]) -> AlertEvidence {
+    fn evidence(&self, policy: &Policy, time: Timestamp, rates: &[Rate]) -> AlertEvidence {
         AlertEvidence {
             has_effect: self.has_effect,
-            ..observed(self.record.observations(), rates, time)
+            ..observed(
+                self.record.observations(),
+                rates,
+                time,
+                days(policy.evacuation_time),
+            )
         }
     }
 }

@@ -8,6 +8,7 @@ use crate::monitor::event::{Event, EventKind};
 use crate::monitor::history::History;
 use crate::monitor::motion::observed;
 use crate::monitor::track::alarm::Levels;
+use crate::monitor::track::days;
 use crate::monitor::track::forecast::{Forecast, LookAhead};
 use crate::monitor::track::record::BenchmarkRecord;
 use crate::reading::Timestamp;
@@ -137,6 +138,7 @@ fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Ale
     });
     let forecast = forecast.as_ref();
     let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
-    let observed = observed(observations, rates, now);
+    let evacuation_days = days(policy.evacuation_time);
+    let observed = observed(observations, rates, now, evacuation_days);
     LookAhead::of(policy, forecast).evidence(policy, forecast, observed)
 }

@@ -1,0 +1,95 @@
+//! A recording on its way in, record by record.
+
+use super::file::{Content, FileTail, read_at};
+use super::records::{self, HEADER_BYTES, MAGIC, NextRecord, RawMessage};
+use crate::runtime::ingest::decode_message;
+use crate::runtime::site::is_logged;
+use std::fs::File;
+use std::io;
+use std::os::unix::fs::FileExt;
+
+impl FileTail {
+    pub(super) fn read_record(&mut self, file: &File, size: u64) -> io::Result<()> {
+        if self.at == 0 {
+            return self.read_magic(file, size);
+        }
+        if size < self.at + HEADER_BYTES as u64 {
+            return Ok(());
+        }
+        let mut header = [0; HEADER_BYTES];
+        file.read_exact_at(&mut header, self.at)?;
+        let body_at = self.at + HEADER_BYTES as u64;
+        match records::frame(header, size - body_at) {
+            NextRecord::Wait => {}
+            NextRecord::Skip { length } => self.at = body_at + length,
+            NextRecord::Read { opcode, length } => {
+                let body = read_at(file, body_at, length)?;
+                let end = body_at + length;
+                self.take_record(opcode, &body, end, end == size);
+            }
+            NextRecord::End => {
+                tracing::info!(file = %self.path.display(), "recording complete");
+                self.content = Content::Complete;
+            }
+            NextRecord::Damaged { length } => {
+                let error = io::Error::other(format!("a record of {length} bytes at {}", self.at));
+                self.refuse(&error);
+            }
+        }
+        Ok(())
+    }
+
+    fn read_magic(&mut self, file: &File, size: u64) -> io::Result<()> {
+        let length = MAGIC.len() as u64;
+        if size >= length {
+            if read_at(file, 0, length)? == MAGIC {
+                self.at = length;
+            } else {
+                self.refuse(&io::Error::other("not an MCAP file"));
+            }
+        }
+        Ok(())
+    }
+
+    fn take_record(&mut self, opcode: u8, body: &[u8], end: u64, is_last: bool) {
+        let Content::Mcap { channels, suspect } = &mut self.content else {
+            return;
+        };
+        match channels.decode(opcode, body) {
+            Ok(messages) => {
+                self.at = end;
+                for message in messages {
+                    self.take_message(&message);
+                }
+            }
+            Err(_) if is_last && *suspect != Some(self.at) => *suspect = Some(self.at),
+            Err(error) => {
+                self.quarantined += 1;
+                let (file, offset, total) = (self.path.display(), self.at, self.quarantined);
+                if is_logged(total) {
+                    tracing::warn!(%file, offset, %error, total, "record quarantined");
+                }
+                self.at = end;
+            }
+        }
+    }
+
+    fn take_message(&mut self, message: &RawMessage) {
+        let RawMessage {
+            topic,
+            metadata,
+            publish_time,
+            payload,
+        } = message;
+        match decode_message(topic, metadata, *publish_time, payload) {
+            Ok(item) => item.into_iter().for_each(|item| self.expect(item)),
+            Err(error) => {
+                self.quarantined += 1;
+                let (file, total) = (self.path.display(), self.quarantined);
+                if is_logged(total) {
+                    tracing::warn!(%file, %error, total, "message quarantined");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! What a rotation leaves: a file under another name that its source asks for too, and a new one under the first name, perhaps without
+//! a header.
+
+use super::file::{Content, FileTail};
+use super::follow::{FileKey, Follower};
+use super::position::FileId;
+use super::text::{LinesRead, TextReader};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// What a rotation appends to a name, or puts before it, beside digits and what stands between them.
+const WORDS: [&str; 5] = ["old", "bak", "prev", "T", "Z"];
+
+/// The first names of files that have been renamed, by their present ones.
+pub(super) type FirstNames = BTreeMap<FileKey, PathBuf>;
+
+impl Follower {
+    /// The files that are followed now.
+    pub(super) fn places(&self) -> BTreeSet<FileId> {
+        self.files.values().filter_map(|file| file.place).collect()
+    }
+
+    /// Of the files that are followed under another name than their first.
+    pub(super) fn first_names(&self) -> FirstNames {
+        let renamed = self
+            .files
+            .iter()
+            .filter(|(_, file)| file.origin != file.path);
+        renamed
+            .map(|(key, file)| (key.clone(), file.origin.clone()))
+            .collect()
+    }
+
+    /// A file that is followed from here on. Where it is a renamed one, packed, it keeps the first name of that; where another one stood
+    /// under its name before, what it holds without a header is read by the header of that.
+    pub(super) fn newly_followed(&self, key: &FileKey, renamed: &FirstNames) -> FileTail {
+        let decoder = std::sync::Arc::clone(&self.sources[key.0].decoder);
+        let plain =
+            (key.1.extension().is_some_and(|it| it == "gz")).then(|| key.1.with_extension(""));
+        let first = plain.and_then(|plain| renamed.get(&(key.0, plain)));
+        let mut file = FileTail::new(
+            first.map_or_else(|| key.1.clone(), |it| packed(it)),
+            decoder,
+        );
+        file.path.clone_from(&key.1);
+        let before = self
+            .files
+            .iter()
+            .filter(|((source, _), one)| *source == key.0 && one.origin == key.1);
+        let latest = before.max_by_key(|(_, one)| one.modified);
+        file.header_before = latest.map(|(_, one)| one.header()).unwrap_or_default();
+        file
+    }
+}
+
+/// The name of a file when it is packed.
+fn packed(name: &Path) -> PathBuf {
+    let mut name = name.as_os_str().to_owned();
+    name.push(".gz");
+    name.into()
+}
+
+impl FileTail {
+    /// The lines of its header, where it is a text that has been read so far.
+    pub(super) fn header(&self) -> Vec<String> {
+        match &self.content {
+            Content::Text(text) => text.header().to_vec(),
+            Content::Packed(_) | Content::Mcap { .. } | Content::Refused(_) | Content::Complete => {
+                Vec::new()
+            }
+        }
+    }
+
+    /// A reader from the start of this file by the header of the one before it, where it begins with a row of that and not with a header.
+    pub(super) fn without_header(&mut self, read: &LinesRead) -> Option<TextReader> {
+        let header = std::mem::take(&mut self.header_before);
+        let first = read
+            .bad
+            .last()
+            .filter(|_| read.is_lost && !header.is_empty())?;
+        let reader = || TextReader::below(self.decoder.text_rows(&self.origin)?, &header);
+        let is_row = reader()?.feed(format!("{}\n", first.text).as_bytes());
+        if is_row.items.is_empty() || !is_row.bad.is_empty() {
+            return None;
+        }
+        let file = self.path.display();
+        tracing::warn!(%file, "begins without a header: read by that of the file that had its name before");
+        reader()
+    }
+}
+
+/// Whether `to` is what a rotation makes of the name of `from`: what is added are digits, as of a date or a number.
+pub(super) fn is_rotated_name(from: &Path, to: &Path) -> bool {
+    let (Some(from), Some(to)) = (stem(from), stem(to)) else {
+        return false;
+    };
+    let is_separator = |one: char| "-_. ".contains(one);
+    let after = to
+        .strip_prefix(from)
+        .filter(|more| more.starts_with(is_separator));
+    let before = to
+        .strip_suffix(from)
+        .filter(|more| more.ends_with(is_separator));
+    after.or(before).is_some_and(|more| {
+        let mut words = more.split(|one: char| is_separator(one) || one.is_ascii_digit());
+        words.all(|word| word.is_empty() || WORDS.contains(&word))
+    })
+}
+
+fn stem(path: &Path) -> Option<&str> {
+    path.file_stem()?.to_str()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_date_or_a_number_beside_the_name_is_that_of_a_rotation() {
+        let is = |from: &str, to: &str| is_rotated_name(Path::new(from), Path::new(to));
+        for to in [
+            "ext7-20261128.csv",
+            "ext7_2026-11-28T06.csv",
+            "ext7.1.csv",
+            "ext7.old.csv",
+            "20261128-ext7.csv",
+        ] {
+            assert!(is("in/ext7.csv", &format!("in/{to}")), "{to}");
+        }
+        for to in [
+            "ext71.csv",
+            "ext8.csv",
+            "ext7-upper.csv",
+            "ext7.csv",
+            "7.csv",
+        ] {
+            assert!(!is("in/ext7.csv", &format!("in/{to}")), "{to}");
+        }
+    }
+}
