@@ -4,6 +4,7 @@ use super::args::{OutputArgs, ReadingArgs, refuse_empty};
 use super::bar;
 use super::columnar::TableArgs;
 use super::table::{TextTable, number, time};
+use super::text::wrapped;
 use crate::alert::{Policy, percent_in_words};
 use crate::config::value;
 use crate::fit::Exponent;
@@ -16,9 +17,6 @@ use crate::runtime::clock::Stopwatch;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::fmt::Write as _;
-
-/// From this difference of two chances of m > 1 on, it is explained.
-const DISAGREE: f64 = 0.5;
 
 /// Invert a benchmark's readings: the law's parameters, the regime, the failure time
 ///
@@ -249,22 +247,26 @@ fn notes(report: &FitReport, is_held: bool) -> String {
     if is_held {
         out.push_str(HELD);
     }
-    if regimes_differ(&report.regime, report.regime_under_load.as_ref()) {
+    let differ = report
+        .regime
+        .differs_from(report.regime_under_load.as_ref());
+    // What is said of a velocity that stood still is among the remarks.
+    if differ && !report.has_stood_still {
         out.push_str(REGIMES_DIFFER);
+    }
+    for remark in &report.remarks {
+        out.push_str(&wrapped(remark, COLUMNS, ""));
+        out.push('\n');
     }
     out
 }
 
-/// What is said where they do.
+/// Columns of a paragraph.
+const COLUMNS: usize = 118;
+
+/// What is said where the two regimes differ.
 pub(super) const REGIMES_DIFFER: &str = "The two regimes differ. The first lets the load change, and is what the monitor goes by; go by it too. The\n\
      second, the parameters and the minima take the load for constant over the whole record.\n";
-
-/// Whether the regime under a constant load and that where it may change say something else.
-pub(super) fn regimes_differ(constant: &FittedRegime, load: Option<&FittedRegime>) -> bool {
-    let unstable = |regime: &FittedRegime| regime.probability_unstable;
-    let both = unstable(constant).zip(load.and_then(unstable));
-    both.is_some_and(|(constant, load)| (constant - load).abs() > DISAGREE)
-}
 
 /// What is said where m is.
 const HELD: &str = "m is held. Regime, onset and intervals are those of the laws under a constant load whose m is about there, and - where\n\

@@ -3,7 +3,7 @@
 use super::args::{OutputArgs, ReadingArgs, refuse_empty};
 use super::bar;
 use super::exit::NoSuchReadings;
-use super::fit::{InversionArgs, REGIMES_DIFFER, regimes_differ};
+use super::fit::{InversionArgs, REGIMES_DIFFER};
 use super::table::{TextTable, number, time};
 use crate::alert::percent_in_words;
 use crate::inversion::{SweepOptions, SweepReport, SweepRow, sweep_showing};
@@ -107,17 +107,23 @@ fn text(report: &SweepReport) -> String {
         table.row(cells(row));
     }
     let (benchmark, quantity) = (&report.benchmark, report.quantity);
-    let mut rows = report.rows.iter();
-    let differ = rows.any(|row| regimes_differ(&row.regime, row.regime_under_load.as_ref()));
+    let differs = |row: &&SweepRow| row.regime.differs_from(row.regime_under_load.as_ref());
+    let differ: Vec<&SweepRow> = report.rows.iter().filter(differs).collect();
     let note = if report.rows.is_empty() {
         "too few readings for a fit: the table has no row\n"
-    } else if differ {
-        REGIMES_DIFFER
-    } else {
+    } else if differ.is_empty() {
         ""
+    } else if differ.iter().all(|row| row.has_stood_still) {
+        STOOD_STILL
+    } else {
+        REGIMES_DIFFER
     };
     format!("benchmark {benchmark}, {quantity} in {unit}, readings from {first}\n\n{table}{note}")
 }
+
+/// What is said where the regimes differ after the velocity has stood still alone.
+const STOOD_STILL: &str = "The two regimes differ where the velocity stood still over the last third of the readings: these do not decide between\n\
+     them. The first, which lets the load change, is what the monitor goes by.\n";
 
 fn cells(row: &SweepRow) -> [String; 15] {
     let percent = |share: Option<f64>| share.map_or("-".to_owned(), percent_in_words);

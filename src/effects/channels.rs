@@ -2,10 +2,12 @@
 
 use super::problem::Problem;
 use super::response::Driver;
-use crate::reading::Channel;
+use crate::reading::{Channel, after_days};
 
 /// A covariate must cover this share of the record.
 const LEAST_COVERAGE: f64 = 0.8;
+/// So many gaps of a covariate are named.
+const NAMED_GAPS: usize = 3;
 /// Two channels are one where what a straight line leaves of the one by the other is less than this share of its variance.
 const SAME: f64 = 1e-4;
 
@@ -90,9 +92,31 @@ pub(super) fn drivers(
             ));
             continue;
         }
+        remarks.extend(of_gaps(problem, &driver));
         drivers.push(driver);
     }
     drivers
+}
+
+/// What is said of a covariate's gaps within the record.
+fn of_gaps(problem: &Problem, driver: &Driver) -> Option<String> {
+    let date = |day: f64| after_days(problem.epoch, day).map(|at| at.strftime("%Y-%m-%d"));
+    let (first, last) = (problem.t[0], problem.t[problem.t.len() - 1]);
+    let mut each = Vec::new();
+    for (from, until) in driver.gaps_within(first, last) {
+        each.push(format!("from {} to {}", date(from)?, date(until)?));
+    }
+    let more = each.len().saturating_sub(NAMED_GAPS);
+    each.truncate(NAMED_GAPS);
+    let rest = (more > 0).then(|| format!("and in {more} more gaps"));
+    each.extend(rest);
+    (!each.is_empty()).then(|| {
+        format!(
+            "{} has no values {}: where it acts, no event is judged there.",
+            driver.name,
+            each.join(", ")
+        )
+    })
 }
 
 #[cfg(test)]
@@ -100,6 +124,8 @@ mod tests {
     use super::super::explain::explain;
     use super::super::fixture::{channel, daily, driven_by_the_lake, lake};
     use super::super::options::Options;
+    use super::super::problem::Problem;
+    use super::drivers;
 
     #[test]
     fn a_channel_that_holds_the_values_of_another_is_named_with_it() {
@@ -122,5 +148,20 @@ mod tests {
             let is_named = said.remarks.iter().any(|one| one.starts_with(&named));
             assert!(is_named, "{copy}: {:?}", said.remarks);
         }
+    }
+    #[test]
+    fn a_gap_in_a_channel_is_named() {
+        let (series, mut channels) = driven_by_the_lake();
+        let from = channels[0].samples[100].time;
+        let until = channels[0].samples[131].time;
+        channels[0]
+            .samples
+            .retain(|sample| sample.time <= from || sample.time >= until);
+        let problem = Problem::new(&series, &channels).unwrap();
+        let mut remarks = Vec::new();
+        assert_eq!(drivers(&problem, &channels, &mut remarks).len(), 2);
+        assert_eq!(remarks.len(), 1, "{remarks:?}");
+        let named = "lake has no values from 2001-04-11 to 2001-05-12";
+        assert!(remarks[0].starts_with(named), "{remarks:?}");
     }
 }

@@ -63,6 +63,9 @@ pub(super) fn objection(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) 
             response.memory_days()
         ));
     }
+    if let Some(reason) = within_a_gap(problem, fitted, drivers) {
+        return Some(reason);
+    }
     let channel = Driver::at(drivers, term.channel);
     let loosening = channel.is_some_and(|driver| is_loosening(&driver.name));
     let level = term.response.is_some_and(|r| r.form == Form::Level);
@@ -105,6 +108,22 @@ pub(super) fn objection(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) 
         | Act::Friction(_)
         | Act::Reading(_) => None,
     }
+}
+
+/// Why the newest term, which happened once, is not judged: a covariate in the law has no values at that time, or none that still acts.
+fn within_a_gap(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) -> Option<String> {
+    let (newest, others) = fitted.terms.split_last()?;
+    let at = newest.at?;
+    let days = [at.saturating_sub(1), at].map(|reading| problem.t[reading]);
+    let missing = others.iter().find_map(|other| {
+        let (driver, response) = (Driver::at(drivers, other.channel)?, other.response?);
+        let unknown = |day: &f64| driver.gap_at(*day, response.mean_days).is_some();
+        days.iter().any(unknown).then_some(driver)
+    });
+    let name = &missing?.name;
+    Some(format!(
+        "{name} is in the law and has no values then: what it did looks the same"
+    ))
 }
 
 /// Whether the motion goes half of its whole way from one reading to the next, jumps of the reading left out.

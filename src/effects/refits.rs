@@ -6,6 +6,7 @@ use super::frame::Frames;
 use super::fresh::{best_of_starts, fresh_laws, from_the_first_readings, under_growing_means};
 use super::linear::Linear;
 use super::noise::{Noise, Whitener};
+use super::problem::Problem;
 use super::refit::{Fitted, Start, jacobian, likeliest, refit, under_likeliest};
 use super::response::{Driver, Response};
 use super::search::{Refitted, SIGNIFICANT, Search};
@@ -104,33 +105,30 @@ impl<'a> Search<'a> {
     pub(super) fn refits(&mut self, base: &Fitted, round: usize) -> Option<Vec<Refitted>> {
         let ground = self.ground(base)?;
         let (count, seed) = (self.options.surrogates, self.seed_of(round));
-        let mut covariates = ground.of_covariates();
-        covariates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        covariates.truncate(MOST_COVARIATES);
-        covariates.extend(self.about_a_steady_law(base, &covariates));
-        let mut covariates = self.refit_each(base, covariates);
-        let again = covariates.iter();
-        let again = again.filter_map(|one| self.with_another_delay(base, one));
-        let again: Vec<Refitted> = again.collect();
-        covariates.extend(again);
-        let covariates = best_of_each_response(covariates, self.options.bic_margin);
+        let covariates = self.through_covariates(base, &ground);
         let (others, tried) = ground.of_itself();
+        let mut best = best_of_each_kind(others);
+        best.truncate(MOST_OTHERS);
+        let mut others = self.refit_each(base, best);
+        self.events_at_one_time(base, &mut others);
         // Only what passes the margin is judged by it.
         let of_noise = |kind| ground.null_gains_of_noise(&tried, kind, count, seed + 1);
         let alone = LazyCell::new(|| of_noise(Innovations::AsTheyAre));
         let without_jumps = LazyCell::new(|| of_noise(Innovations::WithoutJumps));
         let mut all = Vec::new();
-        if covariates
-            .iter()
-            .any(|one| one.gain > self.options.bic_margin)
-        {
-            let null_gains =
-                self.amplified(base, ground.null_gains_of(ground.drivers, count, seed));
-            // The null gains have paid for nothing.
-            let paid = |one: &Refitted| one.gain + ground.cost(&one.term);
+        let margin = self.options.bic_margin;
+        if covariates.iter().any(|one| one.gain > margin) {
+            let shifted = ground.null_gains_of(ground.drivers, count, seed);
+            let null_gains = self.amplified(base, shifted);
+            let covariates = covariates.into_iter().map(|one| {
+                let paid = one.paid(self.problem);
+                one.judged_by(&null_gains, paid)
+            });
+            let mut covariates: Vec<Refitted> = covariates.collect();
+            let rival = others.iter().map(|one| one.gain).fold(0.0, f64::max);
+            self.judge_by_whole_searches(base, &mut covariates, (rival, seed));
             all.extend(covariates.into_iter().map(|one| {
-                let (gain, net) = (paid(&one), one.gain);
-                let one = one.judged_by(&null_gains, gain);
+                let net = one.gain;
                 if one.is_its_own_shift(one.p_value) {
                     return one.judged_by(&alone, net);
                 }
@@ -139,11 +137,7 @@ impl<'a> Search<'a> {
         } else {
             all.extend(covariates);
         }
-        let mut best = best_of_each_kind(others);
-        best.truncate(MOST_OTHERS);
-        let mut others = self.refit_each(base, best);
-        self.events_at_one_time(base, &mut others);
-        if others.iter().any(|one| one.gain > self.options.bic_margin) {
+        if others.iter().any(|one| one.gain > margin) {
             all.extend(others.into_iter().map(|one| {
                 let gain = one.gain;
                 if is_jump(&one.term, &ground.frames) {
@@ -155,6 +149,25 @@ impl<'a> Search<'a> {
             all.extend(others);
         }
         Some(all)
+    }
+
+    /// The best of each covariate, refitted.
+    pub(super) fn through_covariates(
+        &mut self,
+        base: &Fitted,
+        ground: &TrialBase,
+    ) -> Vec<Refitted> {
+        let mut covariates = ground.of_covariates();
+        covariates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        covariates.truncate(MOST_COVARIATES);
+        let steady = self.about_a_steady_law(base, &covariates);
+        covariates.extend(steady);
+        let mut covariates = self.refit_each(base, covariates);
+        let again = covariates.iter();
+        let again = again.filter_map(|one| self.with_another_delay(base, one));
+        let again: Vec<Refitted> = again.collect();
+        covariates.extend(again);
+        best_of_each_response(covariates, self.options.bic_margin)
     }
 
     /// The kinds of what happens once are compared at one time: where the best of them was found, each other one is tried
@@ -422,6 +435,11 @@ impl<'a> Search<'a> {
 }
 
 impl Refitted {
+    /// The gain before its parameters are paid for, as null gains are.
+    pub(super) fn paid(&self, problem: &Problem) -> f64 {
+        self.gain + self.term.parameters() * (problem.used as f64).ln()
+    }
+
     /// Shifted by years, what follows the year is the same again: shifts, which give it this p-value, cannot give its time, and that
     /// noise does not do as much has to be enough. The season stays a rival.
     pub(super) fn is_its_own_shift(&self, shifted: f64) -> bool {

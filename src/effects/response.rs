@@ -2,7 +2,7 @@
 
 use super::act::standardise;
 use super::kind::Form;
-use crate::reading::{Channel, CovariateKind, Timestamp, days_since};
+use crate::reading::{Channel, CovariateKind, RunningTotal, Timestamp, days_since};
 
 /// A covariate's values on an even grid of days, standardised by nothing: in its own unit.
 #[derive(Debug, Clone)]
@@ -19,10 +19,16 @@ pub(super) struct Driver {
     values: Vec<f64>,
     /// Whether each value is what came since the one before it, as of rain, and not what was at its time.
     is_total: bool,
+    /// Times without values, as the days of the last one before and of the first one after.
+    gaps: Vec<(f64, f64)>,
 }
 
 /// The covariate's values are kept on this many points at most.
 const MOST_VALUES: usize = 8192;
+
+/// Samples this many times as far apart as they usually are have others missing between them.
+const GAP: f64 = 8.0;
+const HALF: f64 = 0.5;
 
 /// This share of a step is rounding.
 const ROUNDING: f64 = 1e-6;
@@ -70,21 +76,18 @@ impl Driver {
         {
             return None;
         }
-        let (span, first_value) = (last.0 - first.0, first.1);
-        let start = first.0;
-        let gaps = samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
+        let (span, start) = (last.0 - first.0, first.0);
+        let apart = samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
         let spacing =
-            super::quantiles::upper_median(gaps.collect()).max(span / (MOST_VALUES - 1) as f64);
+            super::quantiles::upper_median(apart.collect()).max(span / (MOST_VALUES - 1) as f64);
         let count = (span / spacing).round().max(3.0);
         let step = span / count;
+        let gaps = gaps(&samples, spacing);
         let is_total = channel.kind() == CovariateKind::Rain;
-        let samples = if is_total { summed(samples) } else { samples };
-        let values = on_a_grid(&samples, step, count);
         let values = if is_total {
-            let each = values.windows(2).map(|pair| pair[1] - pair[0]);
-            [first_value].into_iter().chain(each).collect()
+            amounts(samples, (spacing, &gaps), (step, count))
         } else {
-            values
+            on_a_grid(&samples, step, count)
         };
         Some(Self {
             index,
@@ -94,7 +97,21 @@ impl Driver {
             step,
             values,
             is_total,
+            gaps,
         })
+    }
+
+    /// The gap in its values, as its first day and its last, from which its values of that day are not known: within the gap, or within
+    /// `memory` days of its end.
+    pub(super) fn gap_at(&self, day: f64, memory: f64) -> Option<(f64, f64)> {
+        let mut all = self.gaps.iter().copied();
+        all.find(|(from, until)| (*from..=until + memory).contains(&day))
+    }
+
+    /// Its gaps within these days.
+    pub(super) fn gaps_within(&self, first: f64, last: f64) -> impl Iterator<Item = (f64, f64)> {
+        let all = self.gaps.iter().copied();
+        all.filter(move |(from, until)| *until > first && *from < last)
     }
 
     /// The share of `nodes` that the channel covers.
@@ -139,6 +156,38 @@ impl Driver {
         Self {
             values,
             name: String::new(),
+            gaps: Vec::new(),
+            ..*self
+        }
+    }
+
+    /// The same covariate shifted by a share of its record, and backwards if `mirrored`: a level by its changes, so that none comes in
+    /// where its end meets its beginning, what fell by its amounts.
+    pub(super) fn moved_by(&self, share: f64, mirrored: bool) -> Self {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a share of a length"
+        )]
+        let by = (share * self.len() as f64).round() as usize;
+        if self.is_total {
+            return self.shifted(by, mirrored);
+        }
+        let mut changes: Vec<f64> = self.values.windows(2).map(|w| w[1] - w[0]).collect();
+        if mirrored {
+            changes.reverse();
+        }
+        let by = by % changes.len();
+        changes.rotate_left(by);
+        let mut level = self.values[0];
+        let later = changes.into_iter().map(|change| {
+            level += change;
+            level
+        });
+        Self {
+            values: std::iter::once(self.values[0]).chain(later).collect(),
+            name: self.name.clone(),
+            gaps: Vec::new(),
             ..*self
         }
     }
@@ -206,6 +255,37 @@ impl Driver {
     }
 }
 
+/// Where samples stand further apart than they usually do.
+fn gaps(samples: &[(f64, f64)], spacing: f64) -> Vec<(f64, f64)> {
+    let pairs = samples.windows(2).map(|pair| (pair[0].0, pair[1].0));
+    let long = pairs.filter(|(from, until)| until - from > GAP * spacing);
+    long.collect()
+}
+
+/// The amount of each of `count` steps from the first sample on, of amounts that came since the sample before each, or of their running
+/// total; what came before the first sample is not known of a total, and counts as what usually comes.
+fn amounts(
+    samples: Vec<(f64, f64)>,
+    (spacing, gaps): (f64, &[(f64, f64)]),
+    (step, count): (f64, f64),
+) -> Vec<f64> {
+    let values: Vec<f64> = samples.iter().map(|(_, value)| *value).collect();
+    let total = RunningTotal::of(&values);
+    let is_running = total.is_some();
+    let sums = match total {
+        Some(total) => continued(samples, &total.set_back),
+        None => summed(filled(samples, spacing, gaps)),
+    };
+    let sums = on_a_grid(&sums, step, count);
+    let each = sums.windows(2).map(|pair| pair[1] - pair[0]);
+    let first = if is_running {
+        (sums[sums.len() - 1] - sums[0]) / count
+    } else {
+        values[0]
+    };
+    std::iter::once(first).chain(each).collect()
+}
+
 /// The running sum of amounts, each of which came since the sample before it; that of the first is not known to have come in any time.
 fn summed(samples: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let mut sum = -samples.first().map_or(0.0, |(_, value)| *value);
@@ -214,6 +294,42 @@ fn summed(samples: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
         (t, sum)
     });
     each.collect()
+}
+
+/// A running total as if it had never been set back.
+fn continued(mut samples: Vec<(f64, f64)>, set_back: &[usize]) -> Vec<(f64, f64)> {
+    let mut before = 0.0;
+    let mut from = 0;
+    for end in set_back.iter().copied().chain([samples.len()]) {
+        let last = samples[end - 1].1;
+        for (_, value) in &mut samples[from..end] {
+            *value += before;
+        }
+        (before, from) = (before + last, end);
+    }
+    samples
+}
+
+/// Amounts with the usual one in each gap: the first after it came since the gap's last step, and nobody knows what came before. Where that
+/// first one is half of what usually comes in such a time, it is all that came in the gap.
+fn filled(samples: Vec<(f64, f64)>, spacing: f64, gaps: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let known: f64 = samples.iter().skip(1).map(|(_, value)| value).sum();
+    let missing: f64 = gaps
+        .iter()
+        .map(|(from, until)| until - from - spacing)
+        .sum();
+    let span = samples[samples.len() - 1].0 - samples[0].0;
+    let usual = known / (span - missing).max(spacing);
+    let mut all = Vec::with_capacity(samples.len() + gaps.len());
+    for (until, value) in samples {
+        let gap = gaps.iter().find(|gap| gap.1.total_cmp(&until).is_eq());
+        if let Some((from, _)) = gap.filter(|gap| value < HALF * usual * (until - gap.0)) {
+            let last = until - spacing;
+            all.push((last, usual * (last - from)));
+        }
+        all.push((until, value));
+    }
+    all
 }
 
 /// Samples, linear between them, at `count` steps from the first on.

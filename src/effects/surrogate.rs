@@ -16,7 +16,7 @@ use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64Mcg;
 
 /// A covariate is never shifted by less than this share of its record: it would still be at its right time.
-const LEAST_SHIFT: f64 = 0.06;
+pub(super) const LEAST_SHIFT: f64 = 0.06;
 /// No p-value is claimed below it.
 const LEAST_P: f64 = 1e-6;
 
@@ -37,6 +37,8 @@ const NORMAL_MEDIAN: f64 = 0.6745;
 const AT_ONCE: usize = 128;
 /// How many of the largest null gains are refitted in full.
 const REFITTED: usize = 4;
+/// The scale of a law known from n gains is taken as larger by this over n.
+const FEW: f64 = 3.0;
 
 impl NullGains {
     /// The same gains `times` as large.
@@ -66,14 +68,54 @@ impl NullGains {
         if above > 0 {
             return (above as f64 + 1.0) / (n + 1.0);
         }
-        let mean = self.gains.iter().sum::<f64>() / n;
-        let variance = self.gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / n;
-        let scale = (variance * 6.0).sqrt() / std::f64::consts::PI;
-        // Euler's constant places the mean of Gumbel's law.
-        let place = mean - 0.577_215_664_9 * scale;
-        let tail = -(-(-(gain - place) / scale.max(1e-9)).exp()).exp_m1();
+        let tail = beyond(&self.gains, gain, 1.0);
         tail.clamp(LEAST_P, 1.0).min(1.0 / (n + 1.0))
     }
+}
+
+/// The gains of a few whole searches without any effect.
+#[derive(Debug, Clone, Default)]
+pub(super) struct WholeGains(Vec<f64>);
+
+impl WholeGains {
+    pub(super) fn push(&mut self, gain: f64) {
+        self.0.push(gain);
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// How many of them are as large.
+    pub(super) fn reaching(&self, gain: f64) -> usize {
+        self.0.iter().filter(|one| **one >= gain).count()
+    }
+
+    /// The chance that one more gains as much: by rank, and beyond the largest by Gumbel's law, whose scale so few leave open.
+    pub(super) fn p_value(&self, gain: f64) -> f64 {
+        let n = self.len() as f64;
+        let reaching = self.reaching(gain);
+        if n < 2.0 || reaching > 0 {
+            return (reaching as f64 + 1.0) / (n + 1.0);
+        }
+        beyond(&self.0, gain, 1.0 + FEW / n).clamp(LEAST_P, 1.0)
+    }
+
+    /// The chance that one of two such searches gains as much.
+    pub(super) fn p_of_two(&self, gain: f64) -> f64 {
+        (2.0 * self.p_value(gain)).min(1.0)
+    }
+}
+
+/// The chance of one as large as `gain` by Gumbel's law for maxima, of which these are some; its scale `wider` than theirs.
+fn beyond(gains: &[f64], gain: f64, wider: f64) -> f64 {
+    let n = gains.len() as f64;
+    let mean = gains.iter().sum::<f64>() / n;
+    let variance = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / n;
+    let scale = wider * (variance * 6.0).sqrt() / std::f64::consts::PI;
+    // Euler's constant places the mean of Gumbel's law.
+    let place = mean - 0.577_215_664_9 * scale;
+    -(-(-(gain - place) / scale.max(1e-9)).exp()).exp_m1()
 }
 
 /// What a search over covariates goes through.

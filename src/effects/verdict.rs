@@ -3,6 +3,7 @@
 use super::act::Act;
 use super::candidates::with_response;
 use super::daily;
+use super::dated;
 use super::definition::{EffectSize, FittedCoefficients};
 use super::diagnosis::{Judged, innovations, newest_off};
 use super::explanation::{Candidate, Effect, Explained};
@@ -135,7 +136,10 @@ fn effects_of(
     scratch: &mut Scratch,
 ) -> Vec<Effect> {
     let each = accepted.iter().enumerate();
-    let each = each.map(|(index, how)| effect(ready, full, index, how, scratch));
+    let each = each.map(|(index, how)| Effect {
+        at_interval: dated::interval(ready, full, index, scratch),
+        ..effect(ready, full, index, how, scratch)
+    });
     let mut effects: Vec<Effect> = each.collect();
     effects.sort_by_key(|effect| effect.effect.fits_any_bend());
     effects

@@ -21,8 +21,8 @@ pub use constant_load::{ConstantLoad, FitOutcome};
 pub(crate) use damped::{Damping, Descendable, StepOutcome, descend};
 pub use lattice::Lattice;
 pub use point_readings::PointReadings;
-pub(crate) use rates::displacement_sigma;
 pub use rates::{FINEST_DAYS, Observation, Observations, Rate, RateOptions, ReadingError};
+pub(crate) use rates::{displacement_sigma, widen_merged};
 pub use solution::{EndOfSearch, Exponent, Solution};
 pub use under_load::{
     Assumptions, Ensemble, LawDraws, LawSample, LoadPosterior, Onset, OtherPrior, P_PRIOR,

@@ -340,6 +340,24 @@ fn halve_until(mut rates: Vec<Rate>, most: usize) -> Vec<Rate> {
     rates
 }
 
+/// Widens each rate that point velocities were merged into by half of the spacing of its readings, and no further than to the middle
+/// between its own and its neighbour's: the mean of points is that of the velocity over as much, to a second order of the spacing of one reading. Over the
+/// time from the first of them to the last it is not: a slope that slows down over the time of a merged rate is then read too fast
+/// by several per cent.
+pub(crate) fn widen_merged(rates: &mut [Rate]) {
+    let ends: Vec<(f64, f64)> = rates.iter().map(|rate| (rate.from, rate.to)).collect();
+    for (index, rate) in rates.iter_mut().enumerate() {
+        if rate.readings < 2 || rate.to <= rate.from {
+            continue;
+        }
+        let half = 0.5 * (rate.to - rate.from) / f64::from(rate.readings - 1);
+        let before = index.checked_sub(1).and_then(|before| ends.get(before));
+        let after = ends.get(index + 1);
+        rate.from -= before.map_or(half, |(_, to)| half.min(0.5 * (rate.from - to).max(0.0)));
+        rate.to += after.map_or(half, |(from, _)| half.min(0.5 * (from - rate.to).max(0.0)));
+    }
+}
+
 fn merge(pair: &[Rate]) -> Rate {
     let [earlier, later] = pair else {
         return pair[0];

@@ -8,6 +8,7 @@
 mod estimate;
 mod growth;
 mod held;
+mod remarks;
 mod report;
 mod sweep;
 mod together;
@@ -22,11 +23,11 @@ pub use together::{ApartReport, GroupReport, TogetherReport, together};
 
 use crate::fit::{
     Assumptions, ConstantLoad, Exponent, LawDraws, Observations, PointReadings, Rate, RateOptions,
-    Solution,
+    Solution, widen_merged,
 };
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, outlook};
-use crate::model::Law;
-use crate::reading::{LengthUnit, Series, TimeUnit, Timestamp, Unit, after_days};
+use crate::model::{Accuracy, Law, Trajectory};
+use crate::reading::{LengthUnit, Quantity, Series, TimeUnit, Timestamp, Unit, after_days};
 use jiff::SignedDuration;
 
 /// What is asked of an inversion.
@@ -124,12 +125,19 @@ impl Inversion {
         // A stuck instrument's readings have a posterior too, and it would name a regime.
         let is_informative = !least_squares.outcome.says_nothing();
         let posterior = is_informative
-            .then(|| LawDraws::of(&rates, &Assumptions::CONSTANT_LOAD))
+            .then(|| self.posterior(&rates, least_squares))
             .flatten()
             .and_then(|posterior| held::under(self.options.exponent, posterior));
+        let settled = posterior.as_ref().filter(|posterior| posterior.suffices);
         let is_m_free = matches!(self.options.exponent, Exponent::Free);
         let onset = posterior.as_ref().map(LawDraws::onset);
         let regime = FittedRegime::of(posterior.as_ref());
+        let regime_under_load = outlook
+            .as_ref()
+            .filter(|_| is_informative && is_m_free)
+            .map(FittedRegime::under_load);
+        let has_stood_still = remarks::has_stood_still(&rates);
+        let both = (&regime, regime_under_load.as_ref());
         let best = least_squares.best();
         let first = self.series.readings.first().map(|reading| reading.time);
         FitReport {
@@ -142,7 +150,7 @@ impl Inversion {
             onset: onset.map_or(first, |onset| self.start_at(onset.median_days)),
             onset_low: onset.and_then(|onset| self.start_at(onset.low_days)),
             onset_high: onset.and_then(|onset| self.start_at(onset.high_days)),
-            parameters: estimate::parameters(self, best, posterior.as_ref()),
+            parameters: estimate::parameters(self, best, settled),
             alternatives: Alternatives::of(self, least_squares),
             transition_time: best
                 .and_then(|best| best.law.transition_days())
@@ -154,16 +162,44 @@ impl Inversion {
             ),
             prior_sensitivity: UnderPrior::each(self, posterior.as_ref()),
             inverse_velocity: self.inverse_velocity(&rates, regime.probability_accelerating),
+            remarks: remarks::remarks(posterior.as_ref(), both, has_stood_still),
+            has_stood_still,
             regime,
-            regime_under_load: outlook
-                .as_ref()
-                .filter(|_| is_informative && is_m_free)
-                .map(FittedRegime::under_load),
+            regime_under_load,
             rms: best.map(|best| best.rms).filter(|rms| rms.is_finite()),
             evaluations: least_squares.evaluations,
             seconds,
             termination: least_squares.outcome.to_string(),
         }
+    }
+
+    /// The posterior of a constant load, of which the minima of the misfit are known. Point velocities that were merged count as means
+    /// up to the middle between readings, and laws hold from the first reading on at the earliest.
+    fn posterior(&self, rates: &[Rate], least_squares: &ConstantLoad) -> Option<LawDraws> {
+        let is_of_points =
+            self.series.quantity() == Quantity::Velocity && self.observations.averaging_days == 0.0;
+        let mut rates = rates.to_vec();
+        if is_of_points {
+            widen_merged(&mut rates);
+        }
+        let now = rates.last()?.to;
+        let likely: Vec<Law> = least_squares
+            .minima
+            .iter()
+            .filter_map(|minimum| {
+                let law = law_in_mm_per_day(self, minimum);
+                let y = Trajectory::solve(&law, now, Accuracy::Fit).at(now)?.y;
+                (y.is_finite() && y > 0.0).then(|| law.from_y(y))
+            })
+            .collect();
+        let mut draws = LawDraws::with(&rates, &Assumptions::CONSTANT_LOAD, &likely)?;
+        if is_of_points {
+            draws.from_days = draws.from_days.max(0.0);
+            for span in &mut draws.spans_days {
+                *span = span.min(now);
+            }
+        }
+        Some(draws)
     }
 
     fn rates(&self) -> Vec<Rate> {

@@ -36,7 +36,7 @@ pub struct FitReport {
     pub regime: FittedRegime,
     /// The same where the load may change undeclared: what the monitor goes by. `None` with too few readings, and where m is given.
     pub regime_under_load: Option<FittedRegime>,
-    /// The law's parameters.
+    /// The law's parameters; without intervals where the laws drawn do not suffice for any, which `remarks` says.
     pub parameters: Parameters,
     /// The distinct minima of the misfit, best first.
     pub alternatives: Alternatives,
@@ -58,6 +58,11 @@ pub struct FitReport {
     pub seconds: f64,
     /// Why it ended.
     pub termination: String,
+    /// What a person should know, a paragraph each.
+    pub remarks: Vec<String>,
+    /// Whether the velocity stood still over the last third of the record; for the text.
+    #[serde(skip)]
+    pub has_stood_still: bool,
 }
 
 /// What the constant-load law's posterior says under one prior; the panel's forecast is not in it.
@@ -162,7 +167,17 @@ impl Alternatives {
     }
 }
 
+/// From this difference of two chances of m > 1 on, two regimes say something else.
+const DISAGREE: f64 = 0.5;
+
 impl FittedRegime {
+    /// Whether the regime under a constant load and that where it may change say something else.
+    pub fn differs_from(&self, under_load: Option<&Self>) -> bool {
+        let unstable = under_load.and_then(|regime| regime.probability_unstable);
+        let both = self.probability_unstable.zip(unstable);
+        both.is_some_and(|(constant, load)| (constant - load).abs() > DISAGREE)
+    }
+
     pub(super) fn of(posterior: Option<&LawDraws>) -> Self {
         let Some(posterior) = posterior else {
             return Self {

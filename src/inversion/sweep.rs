@@ -58,6 +58,9 @@ pub struct SweepRow {
     pub regime: FittedRegime,
     /// The same where the load may change undeclared: what the monitor goes by. `None` with too few readings, and where m is given.
     pub regime_under_load: Option<FittedRegime>,
+    /// Whether the velocity stood still over the last third of the readings; for the text.
+    #[serde(skip)]
+    pub has_stood_still: bool,
     /// m of the best fit.
     pub m: Option<f64>,
     /// Its initial state.
@@ -143,6 +146,7 @@ impl SweepRow {
             t_max,
             readings: report.readings,
             regime: report.regime,
+            has_stood_still: report.has_stood_still,
             regime_under_load: report.regime_under_load,
             m: report.parameters.m.best,
             x_i: report.parameters.x_i.best,

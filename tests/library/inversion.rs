@@ -274,6 +274,61 @@ fn a_slope_that_only_slows_down_is_not_said_to_fail() {
     assert_eq!(report.termination, "converged");
 }
 
+/// `count` velocities of a law over so many days, which scatter by this share.
+fn velocities(law: &Law, (count, days): (usize, f64), noise: f64) -> Series {
+    let solution = Trajectory::solve(law, days, Accuracy::Full);
+    let start: Timestamp = START.parse().unwrap();
+    let reading = |index: usize| {
+        let seconds = (days * 86_400.0 * index as f64 / (count - 1) as f64).floor();
+        let velocity = solution.at(seconds / 86_400.0).unwrap().velocity;
+        Reading {
+            time: start + SignedDuration::from_secs_f64(seconds),
+            value: velocity * (1.0 + noise * scatter(index)),
+            sigma: None,
+        }
+    };
+    Series {
+        readings: (0..count).map(reading).collect(),
+        ..series(Unit::MM_PER_DAY, &[])
+    }
+}
+
+#[test]
+fn readings_that_scatter_by_a_thousandth_leave_little_open_and_the_truth_within() {
+    let law = Law::from_paper(0.7536, 0.2246, 17.08, 2.5).unwrap();
+    let series = velocities(&law, (500, 338.9), 1e-3);
+    let parameters = report(&series, &InversionOptions::default()).parameters;
+    for (name, estimate, truth) in [
+        ("m", parameters.m, law.paper().m),
+        ("T", parameters.t_unit_days, 17.08),
+        ("r", parameters.r_per_day, law.r),
+        ("kappa", parameters.kappa_per_day, law.kappa),
+    ] {
+        let (low, high) = (estimate.low.unwrap(), estimate.high.unwrap());
+        let name = format!("{name}: {truth} {estimate:?}");
+        assert!((low..=high).contains(&truth), "{name}");
+        let width = (high - low) / truth.abs();
+        assert!((2e-3..0.3).contains(&width), "{name}");
+    }
+}
+
+#[test]
+fn of_a_velocity_that_came_to_rest_it_is_said_what_the_two_regimes_disagree_about() {
+    let law = Law::from_paper(0.6, 3.0, 10.0, 5.0).unwrap();
+    let series = velocities(&law, (200, 200.0), 0.01);
+    let report = report(&series, &InversionOptions::default());
+    assert!(
+        report
+            .regime
+            .differs_from(report.regime_under_load.as_ref()),
+        "{:?} {:?}",
+        report.regime,
+        report.regime_under_load
+    );
+    let said = report.remarks.join(" ");
+    assert!(said.contains("the regime is undetermined"), "{said}");
+}
+
 #[test]
 fn the_report_has_the_documented_keys_in_their_order() {
     let vaiont = recording("vaiont-1963-reconstruction.mcap");
@@ -306,7 +361,8 @@ fn the_report_has_the_documented_keys_in_their_order() {
             "rms",
             "evaluations",
             "seconds",
-            "termination"
+            "termination",
+            "remarks"
         ]
     );
     assert_eq!(

@@ -46,3 +46,4 @@ mod steady_creep;
 mod text_formats;
 mod together;
 mod under_load;
+mod unrelated_walks;

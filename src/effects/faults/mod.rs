@@ -18,7 +18,7 @@ mod twin;
 use super::explanation::Fault;
 use super::kind::FaultKind;
 use crate::effects::quantiles::median;
-use crate::reading::{Channel, Series, Timestamp, days_since};
+use crate::reading::{Channel, RunningTotal, Series, Timestamp, days_since};
 use copies::Copied;
 use nature::Nature;
 use reset::ChannelReset;
@@ -183,9 +183,18 @@ impl FaultBench {
         self.take_out_copied_readings();
         for source in self.sources().into_iter().skip(1) {
             let trace = self.trace(source);
+            if self.is_running_total(source, &trace) {
+                continue;
+            }
             let copies = copies::copied_rows(&trace, &[]);
             self.take_out_copied(source, &trace, &copies);
         }
+    }
+
+    /// Whether it is rain as a running total: on dry days that repeats itself.
+    fn is_running_total(&self, source: Source, trace: &Trace) -> bool {
+        let is_rain = matches!(source, Source::Channel(index) if self.natures[index].is_rain());
+        is_rain && RunningTotal::of(&trace.values).is_some()
     }
 
     /// The copied rows of the benchmark, and of each channel the values that were copied with them.

@@ -6,8 +6,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
+mod totals;
 mod units;
-
 const COUNT: usize = 400;
 
 /// Independent, standard deviation one.

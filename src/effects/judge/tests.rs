@@ -216,3 +216,48 @@ fn what_moves_half_of_its_way_between_two_readings_may_be_a_jump_of_the_reading(
     assert!(jumps_at_once(&problem, &predicting(path(400.0))));
     assert!(!jumps_at_once(&problem, &predicting(path(100.0))));
 }
+
+#[test]
+fn no_event_is_judged_where_a_covariate_in_the_law_has_no_values() {
+    let problem = steady(Quantity::Displacement, &daily(COUNT), 1);
+    let noise = normals(&mut generator(2), COUNT);
+    let with_values = |day: &usize| !(101..130).contains(day);
+    let days: Vec<f64> = (0..COUNT)
+        .filter(with_values)
+        .map(|day| day as f64)
+        .collect();
+    let values: Vec<f64> = (0..COUNT)
+        .filter(with_values)
+        .map(|day| noise[day])
+        .collect();
+    let level = channel("reservoir_level_m", &days, &values);
+    let drivers = [Driver::new(0, &level, epoch()).unwrap()];
+    let response = Response {
+        form: Form::Level,
+        stages: 1,
+        mean_days: 5.0,
+    };
+    let through = Term {
+        channel: Some(0),
+        response: Some(response),
+        ..term(
+            Kind::HYDROLOGICAL,
+            Act::Load(vec![vec![0.0; problem.nodes.len()]]),
+        )
+    };
+    for (at, is_known) in [(60, true), (115, false), (132, false), (200, true)] {
+        let event = Term {
+            at: Some(at),
+            ..term(Kind::STATE_RESET, Act::Reset)
+        };
+        let mut both = fitted(through.clone(), &[0.5, 0.2]);
+        both.terms.push(event);
+        both.prediction.clone_from(&problem.y);
+        both.velocity = vec![1.0; problem.t.len()];
+        let said = within_a_gap(&problem, &both, &drivers);
+        assert_eq!(said.is_none(), is_known, "{at}: {said:?}");
+        if let Some(said) = said {
+            assert!(said.starts_with("reservoir_level_m"), "{said}");
+        }
+    }
+}

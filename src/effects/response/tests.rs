@@ -194,3 +194,72 @@ fn a_total_after_a_gap_falls_over_all_of_it_and_none_is_lost() {
         assert!((given - right).abs() < 1e-9, "{given} for {right}");
     }
 }
+
+#[test]
+fn the_first_day_after_a_long_gap_is_not_spread_over_it() {
+    let days: Vec<f64> = (1..=100).map(f64::from).collect();
+    let totals: Vec<f64> = days.iter().map(|day| 3.0 * (day % 2.0)).collect();
+    let is_kept = |day: &f64| !(41.0..=60.0).contains(day);
+    let kept = days.iter().zip(&totals).filter(|(day, _)| is_kept(day));
+    let (times, mut amounts): (Vec<f64>, Vec<f64>) = kept.unzip();
+    let given = |amounts: &[f64]| {
+        let driver = Driver::new(0, &channel("rain_mm", &times, amounts), epoch()).unwrap();
+        assert_eq!(driver.gap_at(50.0, 0.0), Some((40.0, 61.0)));
+        assert_eq!(driver.gap_at(63.0, 1.0), None);
+        assert!(driver.gap_at(63.0, 5.0).is_some());
+        driver.respond_in_unit(of(Form::Level, 1, 0.0), &days)
+    };
+    let by_day = given(&amounts);
+    for (day, (given, right)) in days.iter().zip(by_day.iter().zip(&totals)) {
+        let right = if is_kept(day) { *right } else { 1.5 };
+        assert!((given - right).abs() < 0.05, "{day}: {given} for {right}");
+    }
+    // What was read at once after the gap fell in it.
+    amounts[40] = 42.0;
+    let all_at_once = given(&amounts);
+    assert!((all_at_once[49] - 2.0).abs() < 1e-9, "{}", all_at_once[49]);
+}
+
+#[test]
+fn a_running_total_acts_as_the_amounts_that_it_sums() {
+    let (by_day, totals) = rain(120);
+    let mut sum = 300.0;
+    let running = totals.iter().enumerate().map(|(day, amount)| {
+        // Set back once.
+        sum = if day == 70 { *amount } else { sum + amount };
+        sum
+    });
+    let running: Vec<f64> = running.collect();
+    let times: Vec<f64> = (1..=120).map(f64::from).collect();
+    let driver = Driver::new(0, &channel("rain_mm", &times, &running), epoch()).unwrap();
+    let days = &times[1..70];
+    let [given, right] =
+        [&driver, &by_day].map(|driver| driver.respond_in_unit(of(Form::Level, 1, 0.0), days));
+    for (day, (given, right)) in days.iter().zip(given.iter().zip(&right)) {
+        assert!((given - right).abs() < 1e-9, "{day}: {given} for {right}");
+    }
+}
+
+#[test]
+fn a_level_moved_to_another_time_has_the_same_changes_and_rain_the_same_amounts() {
+    let level = noise(200);
+    for mirrored in [false, true] {
+        let moved = level.moved_by(0.3, mirrored);
+        let changes = |driver: &Driver| {
+            let pairs = driver.values.windows(2);
+            let mut all: Vec<f64> = pairs.map(|pair| pair[1] - pair[0]).collect();
+            all.sort_by(f64::total_cmp);
+            all
+        };
+        for (moved, own) in changes(&moved).iter().zip(changes(&level)) {
+            assert!((moved - own).abs() < 1e-9, "{moved} {own}");
+        }
+        let (rain, _) = rain(120);
+        let mut moved = rain.moved_by(0.3, mirrored).values;
+        let mut own = rain.values.clone();
+        assert_ne!(moved, own);
+        moved.sort_by(f64::total_cmp);
+        own.sort_by(f64::total_cmp);
+        assert_eq!(moved, own);
+    }
+}

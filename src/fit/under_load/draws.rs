@@ -6,13 +6,24 @@ use super::walk::{DrawnLaw, Walk};
 use super::{Ensemble, FEWEST, LawSample};
 use crate::fit::Rate;
 use crate::model::Law;
+use std::collections::BTreeSet;
 
 /// Rounds before anything is drawn, how often rates are doubted meanwhile, rounds after that, and in how many of those the
 /// population is taken.
 const BEFORE: usize = 80;
+const BEFORE_AGAIN: usize = 200;
 const DOUBTED: usize = 40;
 const AFTER: usize = 288;
 const TAKEN: usize = 16;
+/// How often the population begins again where what was drawn does not suffice, and how many different laws do.
+const AGAIN: usize = 3;
+const FEWEST_DIFFERENT: usize = 300;
+/// Between the first third and the last of what was drawn the mean of ln of the density moves by no more than this at rest, and by no more
+/// than that while a population only grows narrower: then what it leaves open is too wide, and not too narrow.
+const AT_REST: f64 = 1.0;
+const STILL_NARROWING: f64 = 8.0;
+/// The least standard deviation of ln of the density: one of a normal posterior of one dimension is 0.7, of seven 1.9.
+const LEAST_SPREAD: f64 = 0.8;
 
 /// When the law began to hold, days since the epoch of the rates; the bounds hold 90 %.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,11 +47,20 @@ pub struct LawDraws {
     pub spans_days: Vec<f64>,
     /// Laws that were weighed.
     pub evaluations: usize,
+    /// Whether they are so many different ones, and the likeliest among them, that their quantiles mean something.
+    pub suffices: bool,
 }
 
 impl LawDraws {
     /// Draws laws that agree with `rates`, oldest first; `None` with fewer than five, or where none of them moves.
     pub fn of(rates: &[Rate], assumed: &Assumptions) -> Option<Self> {
+        Self::with(rates, assumed, &[])
+    }
+
+    /// The same where laws of today are known that may be about the likeliest: where what is drawn does not suffice, it is drawn
+    /// again about these. Readings that scatter little leave so narrow a range open that a population that begins with the
+    /// table of laws may come to stand still beside it.
+    pub fn with(rates: &[Rate], assumed: &Assumptions, likely: &[Law]) -> Option<Self> {
         let (first, last) = (rates.first()?, rates.last()?);
         let moves = rates.iter().any(|rate| rate.velocity > 0.0);
         if rates.len() < FEWEST || !moves || last.to <= first.from {
@@ -49,20 +69,20 @@ impl LawDraws {
         let mut search = GridSearch::new(rates, assumed);
         let cells = search.cells(rates)?;
         let mut walk = Walk::about(&cells, search)?;
-        for round in 1..=BEFORE {
-            walk.round();
-            if round.is_multiple_of(DOUBTED) {
-                walk.doubt();
+        let mut drawn = draw(&mut walk, false);
+        let mut suffices = suffices(&mut walk, &drawn);
+        for _ in 0..AGAIN {
+            if suffices && moved(&drawn) <= AT_REST {
+                break;
             }
-        }
-        let mut drawn: Vec<DrawnLaw> = Vec::new();
-        for round in 1..=AFTER {
-            walk.round();
-            if round.is_multiple_of(TAKEN) {
-                drawn.extend(walk.draw());
+            if !suffices {
+                walk.begin_again(likely);
             }
+            drawn = draw(&mut walk, true);
+            suffices = self::suffices(&mut walk, &drawn);
         }
-        Self::from(&walk, &drawn, first.from, last.to)
+        let draws = Self::from(&walk, &drawn, first.from, last.to)?;
+        Some(Self { suffices, ..draws })
     }
 
     fn from(walk: &Walk, drawn: &[DrawnLaw], from_days: f64, now_days: f64) -> Option<Self> {
@@ -86,6 +106,7 @@ impl LawDraws {
             from_days,
             spans_days: spans.collect(),
             evaluations: walk.evaluations(),
+            suffices: true,
         })
     }
 
@@ -105,6 +126,52 @@ impl LawDraws {
             high_days: at(19),
         }
     }
+}
+
+/// Lets the population come to rest, for longer where it is there again, and then takes it now and then.
+fn draw(walk: &mut Walk, again: bool) -> Vec<DrawnLaw> {
+    let before = if again { BEFORE_AGAIN } else { BEFORE };
+    for round in 1..=before {
+        walk.round();
+        if round.is_multiple_of(DOUBTED) {
+            walk.doubt();
+            if again && round < before {
+                walk.leave_behind();
+            }
+        }
+    }
+    let mut drawn: Vec<DrawnLaw> = Vec::new();
+    for round in 1..=AFTER {
+        walk.round();
+        if round.is_multiple_of(TAKEN) {
+            drawn.extend(walk.draw());
+        }
+    }
+    drawn
+}
+
+fn mean_ln(drawn: &[DrawnLaw]) -> f64 {
+    drawn.iter().map(|one| one.ln).sum::<f64>() / drawn.len().max(1) as f64
+}
+
+/// How far the mean of ln of the density moves from the first third to the last of what was drawn.
+fn moved(drawn: &[DrawnLaw]) -> f64 {
+    let third = drawn.len() / 3;
+    (mean_ln(&drawn[drawn.len() - third..]) - mean_ln(&drawn[..third])).abs()
+}
+
+/// Whether what was drawn are different laws, not far from rest, and no likelier one is known.
+fn suffices(walk: &mut Walk, drawn: &[DrawnLaw]) -> bool {
+    let different: BTreeSet<u64> = drawn.iter().map(|one| one.ln.to_bits()).collect();
+    let whole = mean_ln(drawn);
+    let squares = drawn.iter().map(|one| (one.ln - whole).powi(2));
+    let spread = (squares.sum::<f64>() / drawn.len().max(1) as f64).sqrt();
+    let lns = drawn.iter().map(|one| one.ln);
+    let best = lns.fold(f64::NEG_INFINITY, f64::max);
+    different.len() >= FEWEST_DIFFERENT
+        && moved(drawn) <= STILL_NARROWING
+        && spread >= LEAST_SPREAD
+        && !walk.knows_likelier(best)
 }
 
 impl DrawnLaw {

@@ -30,19 +30,17 @@ const WIDEST: f64 = 6.0;
 
 /// The likeliest law of one side of m = 1 that either gathers speed or loses it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Mode<'a> {
-    /// The law of the table that it was found from.
-    pub(super) cell: &'a Cell,
+pub(super) struct Mode {
     pub(super) ln: f64,
-    at: Point,
+    pub(super) at: Point,
     /// The lower triangle whose square is the covariance of p, curvature and slope.
     root: Matrix3<f64>,
     /// Standard error of ln of the scatter.
     scatter_error: f64,
 }
 
-impl Mode<'_> {
-    /// A law about this one: the shape and the scatter by the normal density, what remembers as in `near`, a law about that of the table.
+impl Mode {
+    /// A law about this one: the shape and the scatter by the normal density, what remembers as in `near`.
     pub(super) fn draw(&self, near: &Point, generator: &mut Pcg64) -> Point {
         let wider = WIDEST.powf(generator.random());
         let mut normal = || wider * generator.sample::<f64, _>(StandardNormal);
@@ -56,8 +54,8 @@ impl Mode<'_> {
     }
 }
 
-/// The modes that are found from the heaviest law of each regime, each over the whole record and over what that law explains.
-pub(super) fn modes<'a>(cells: &'a [Cell], weigher: &mut LawWeigher) -> Vec<Mode<'a>> {
+/// The modes that are found from the heaviest law of each regime, each with that law.
+pub(super) fn modes<'a>(cells: &'a [Cell], weigher: &mut LawWeigher) -> Vec<(&'a Cell, Mode)> {
     let mut modes = Vec::new();
     for regime in Regime::KNOWN {
         let of_it = cells.iter().filter(|cell| cell.shape().regime() == regime);
@@ -65,25 +63,26 @@ pub(super) fn modes<'a>(cells: &'a [Cell], weigher: &mut LawWeigher) -> Vec<Mode
             continue;
         };
         let start = weigher.space.at(cell);
-        let count = weigher.record.from.len();
-        let (_, gains, _) = weigher.weigh(&start, f64::NEG_INFINITY);
-        let explained = evidence::start_at(&gains, &weigher.room, 0.5).map(|law| law.rates);
-        let explained = explained.unwrap_or(count);
-        let whole = (explained < count).then_some(count);
-        for rates in [Some(explained), whole].into_iter().flatten() {
-            modes.extend(mode(cell, &start, count - rates, weigher));
-        }
+        let found = modes_from(&start, weigher);
+        modes.extend(found.into_iter().map(|mode| (cell, mode)));
     }
     modes
 }
 
+/// The modes that are found from one law, over the whole record and over what that law explains.
+pub(super) fn modes_from(start: &Point, weigher: &mut LawWeigher) -> Vec<Mode> {
+    let count = weigher.record.from.len();
+    let (_, gains, _) = weigher.weigh(start, f64::NEG_INFINITY);
+    let explained = evidence::start_at(&gains, &weigher.room, 0.5).map(|law| law.rates);
+    let explained = explained.unwrap_or(count);
+    let whole = (explained < count).then_some(count);
+    let each = [Some(explained), whole].into_iter().flatten();
+    each.filter_map(|rates| mode(start, count - rates, weigher))
+        .collect()
+}
+
 /// The mode that a descent from `start` ends in, over the rates from `first` on.
-fn mode<'a>(
-    cell: &'a Cell,
-    start: &Point,
-    first: usize,
-    weigher: &mut LawWeigher,
-) -> Option<Mode<'a>> {
+fn mode(start: &Point, first: usize, weigher: &mut LawWeigher) -> Option<Mode> {
     let mut problem = LeastSquares::from(*start, first, weigher);
     for _ in 0..RESCALED {
         descend(&mut problem, &DAMPING, ROUNDS);
@@ -95,7 +94,6 @@ fn mode<'a>(
     let root = problem.normal.0.try_inverse()?.cholesky()?.l();
     let (at, count) = (problem.at, problem.residuals.len());
     Some(Mode {
-        cell,
         ln: weigher.ln_posterior(&at, f64::NEG_INFINITY),
         at,
         root,

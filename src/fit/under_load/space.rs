@@ -15,11 +15,12 @@ use super::assumptions::Assumptions;
 use super::gains::{LoadNoise, RateRecord};
 use super::past::PastShape;
 use super::prior::{P_PRIOR, SlopePrior, above_kept};
+use crate::model::Law;
 use nalgebra::SVector;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
-/// p; ln of the lesser of loading and healing or, where that has the prior, of |kappa|, 1/day; ln of |r| over the lowest, with the sign of r; ln of the scatter, of the
+/// p; ln of the lesser of loading and healing or, where that has the prior, of |kappa|, 1/day; ln of 1 + |r| over the lowest of the table, with the sign of r; ln of the scatter, of the
 /// standard deviation of what remembers, and of its memory in days; the readings' share of a difference's variance. Laws that hardly accelerate are next to those that hardly
 /// slow down, and m a little above 1 next to m a little below.
 pub(super) type Point = SVector<f64, 7>;
@@ -86,8 +87,7 @@ impl Space {
     }
 
     pub(super) fn shape(&self, at: &Point) -> DrawnShape {
-        let size = self.slope.lowest * at[SLOPE].abs().exp();
-        let r = size.copysign(at[SLOPE]);
+        let r = self.size(at).copysign(at[SLOPE]);
         let c = if self.assumed.curvature.is_some() {
             at[CURVATURE].exp() / at[P].abs().max(1e-12)
         } else {
@@ -103,6 +103,11 @@ impl Space {
             b,
             c,
         }
+    }
+
+    /// |r|, which goes to 0: a slope that has come to its steady velocity has less than the table's lowest.
+    fn size(&self, at: &Point) -> f64 {
+        self.slope.lowest * at[SLOPE].abs().exp_m1()
     }
 
     pub(super) fn noise(&self, at: &Point) -> LoadNoise {
@@ -157,7 +162,7 @@ impl Space {
 
     /// ln of the prior density, but for what a stable slope keeps; minus infinity outside of the range.
     pub(super) fn ln_prior(&self, at: &Point) -> f64 {
-        let size = self.slope.lowest * at[SLOPE].abs().exp();
+        let size = self.size(at).max(self.slope.lowest);
         let (shortest, longest) = self.memories;
         let is_inside = at[P] > P_PRIOR.0
             && at[P] < P_PRIOR.1
@@ -204,6 +209,39 @@ impl Space {
         })
     }
 
+    /// A law of today whose readings scatter by so much, of which nothing remembers where that may be; `None` where the coordinates
+    /// have no place for it.
+    pub(super) fn of_law(&self, law: &Law, scatter: f64) -> Option<Point> {
+        let p = law.p.clamp(P_PRIOR.0 + 1e-3, P_PRIOR.1 - 1e-3);
+        let curvature = if self.assumed.curvature.is_some() {
+            law.kappa.abs().max(1e-6 / self.length)
+        } else {
+            law.a.min(law.b)
+        };
+        let (shortest, longest) = self.memories;
+        let at = Point::from([
+            p,
+            curvature.ln(),
+            (law.r.abs() / self.slope.lowest).ln_1p().copysign(law.r),
+            scatter.ln(),
+            SIGMA_PRIOR.0.ln() - (NOTHING_REMEMBERS.0 + 0.5 * NOTHING_REMEMBERS.1) * SIGMA_PRIOR.1,
+            f64::midpoint(shortest, longest),
+            0.5,
+        ]);
+        let is_of_one_side = law.kappa * p >= 0.0;
+        (is_of_one_side && self.ln_prior(&at).is_finite()).then_some(at)
+    }
+
+    /// The same law under any memory of the scatter that may be.
+    pub(super) fn with_any_memory(&self, at: &Point, generator: &mut Pcg64) -> Point {
+        let mut with = *at;
+        let (shortest, longest) = self.memories;
+        with[SIGMA] = SIGMA_PRIOR.0.ln() - NOTHING_REMEMBERS.0 * generator.random::<f64>();
+        with[MEMORY] = shortest + (longest - shortest) * generator.random::<f64>();
+        with[SHARED] = generator.random::<f64>();
+        with
+    }
+
     /// The same law where nothing remembers, if that may be.
     pub(super) fn without_memory(&self, at: &Point, generator: &mut Pcg64) -> Point {
         let mut without = *at;
@@ -221,7 +259,7 @@ impl Space {
         let (p_around, ln_around) = AROUND;
         let p = (shape.p + spread(p_around)).clamp(P_PRIOR.0 + 1e-3, P_PRIOR.1 - 1e-3);
         let (r, _) = shape.slope_and_curvature(cell.r);
-        let slope = (cell.r / self.slope.lowest).ln() + spread(0.3 * ln_around);
+        let slope = (cell.r / self.slope.lowest).ln_1p() + spread(0.3 * ln_around);
         let lesser = (shape.lesser() * cell.r).ln() + spread(ln_around);
         let curvature = if self.assumed.curvature.is_some() {
             let healing = lesser.exp() + (-cell.r.copysign(r)).max(0.0);

@@ -4,10 +4,11 @@
 use super::Cell;
 use super::evidence::{self, StartedLaw};
 use super::gains::RateRecord;
-use super::modes::modes;
+use super::modes::{Mode, modes, modes_from};
 use super::search::GridSearch;
-use super::space::{DrawnShape, Point, Space};
+use super::space::{DrawnShape, Point, SCATTER, Space};
 use super::weigher::LawWeigher;
+use crate::model::Law;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -16,6 +17,17 @@ use rand_pcg::Pcg64;
 const WALKERS: usize = 64;
 const CHOSEN_FROM: usize = 3;
 const CHOSEN_ABOUT_MODES: usize = 6;
+/// How many where it begins again, so many of which count at least; the lowest power of the posterior that they are chosen by.
+const ABOUT_MODES_AGAIN: usize = 12;
+const ENOUGH_APART: f64 = 32.0;
+const LEAST_POWER: f64 = 1e-4;
+/// Densities of one mode, ln, and by how much a likelier law leaves no doubt that a population is not about it.
+const SAME: f64 = 1e-3;
+const LIKELIER: f64 = 4.0;
+/// So much less likely than the best, ln, are one in a thousand of a normal posterior of seven dimensions; laws that a population goes on
+/// from at least.
+const FAR_BEHIND: f64 = 12.5;
+const FEWEST_KEPT: usize = 16;
 /// Steps along differences, over the size that is best for a normal posterior: 2.38 over the root of twice its dimensions.
 const STEP: f64 = 0.636;
 /// One round in this many goes the whole difference, from one mode to another.
@@ -45,6 +57,8 @@ pub(super) struct DrawnLaw {
     pub(super) variance: f64,
     /// A standard normal number for its velocity.
     pub(super) deviate: f64,
+    /// ln of its posterior density.
+    pub(super) ln: f64,
 }
 
 /// A population on its way.
@@ -53,6 +67,8 @@ pub(super) struct Walk {
     walkers: Vec<Walker>,
     generator: Pcg64,
     rounds: usize,
+    /// The likeliest laws that a descent found.
+    modes: Vec<Point>,
 }
 
 /// Which of those with these shares of 1 are taken, each as often as its share has it, `wanted` times in all.
@@ -69,11 +85,16 @@ fn in_proportion(shares: impl Iterator<Item = f64>, wanted: usize) -> Vec<usize>
 
 /// What each has of the root of the posterior, of whose density these are the logarithms; nothing where none has any.
 fn shares_of_root(lns: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
+    shares_of_power(lns, 0.5)
+}
+
+/// The same of another power of it.
+fn shares_of_power(lns: impl Iterator<Item = f64> + Clone, power: f64) -> Vec<f64> {
     let best = lns.clone().fold(f64::NEG_INFINITY, f64::max);
     if !best.is_finite() {
         return Vec::new();
     }
-    let weights = lns.map(|ln| (0.5 * (ln - best)).exp());
+    let weights = lns.map(|ln| (power * (ln - best)).exp());
     let total: f64 = weights.clone().sum();
     weights.map(|weight| weight / total).collect()
 }
@@ -87,6 +108,7 @@ impl Walk {
             walkers: Vec::new(),
             generator: Pcg64::seed_from_u64(SEED),
             rounds: 0,
+            modes: Vec::new(),
         };
         let mut tried: Vec<Walker> =
             Vec::with_capacity(WALKERS * (CHOSEN_FROM + CHOSEN_ABOUT_MODES));
@@ -103,11 +125,12 @@ impl Walk {
     /// Laws about the likeliest ones, of each as many as it has of the root of the posterior.
     fn try_modes(&mut self, cells: &[Cell], tried: &mut Vec<Walker>) {
         let modes = modes(cells, &mut self.scales);
-        let shares = shares_of_root(modes.iter().map(|mode| mode.ln));
+        self.modes = modes.iter().map(|(_, mode)| mode.at).collect();
+        let shares = shares_of_root(modes.iter().map(|(_, mode)| mode.ln));
         let chosen = in_proportion(shares.into_iter(), WALKERS * CHOSEN_ABOUT_MODES);
         for (drawn, index) in chosen.into_iter().enumerate() {
-            let (mode, space) = (&modes[index], &self.scales.space);
-            let mut near = space.near(mode.cell, &mut self.generator);
+            let ((cell, mode), space) = (&modes[index], &self.scales.space);
+            let mut near = space.near(cell, &mut self.generator);
             if drawn % 2 == 0 {
                 near = space.without_memory(&near, &mut self.generator);
             }
@@ -127,6 +150,96 @@ impl Walk {
         let shares = shares_of_root(tried.iter().map(|one| one.ln));
         let chosen = in_proportion(shares.into_iter(), WALKERS);
         self.walkers = chosen.into_iter().map(|index| tried[index]).collect();
+    }
+
+    /// Begins again about the likeliest laws that a descent finds from these laws of today, from the best of the population, and from
+    /// those that were found before. So many are drawn about them, and chosen by so low a power of the posterior, that the
+    /// population does not begin as a few laws.
+    pub(super) fn begin_again(&mut self, laws: &[Law]) {
+        self.scales.record.trust.fill(1.0);
+        let found = self.find_modes(laws);
+        let likeliest = found.iter().max_by(|a, b| a.ln.total_cmp(&b.ln));
+        let Some(likeliest) = likeliest.map(|mode| mode.at) else {
+            return;
+        };
+        self.doubt_by(&likeliest);
+        let found = self.find_modes(laws);
+        self.modes = found.iter().map(|mode| mode.at).collect();
+        let shares = shares_of_root(found.iter().map(|mode| mode.ln));
+        let mut tried = Vec::new();
+        for (drawn, index) in in_proportion(shares.into_iter(), WALKERS * ABOUT_MODES_AGAIN)
+            .into_iter()
+            .enumerate()
+        {
+            let (mode, space) = (&found[index], &self.scales.space);
+            let near = if drawn % 2 == 0 {
+                space.without_memory(&mode.at, &mut self.generator)
+            } else {
+                space.with_any_memory(&mode.at, &mut self.generator)
+            };
+            let at = mode.draw(&near, &mut self.generator);
+            tried.push(self.walker(at));
+        }
+        self.choose_many(&tried);
+    }
+
+    /// The modes found from these laws, from the best of the population and from the modes so far.
+    fn find_modes(&mut self, laws: &[Law]) -> Vec<Mode> {
+        let best = self.walkers.iter().max_by(|a, b| a.ln.total_cmp(&b.ln));
+        let mut starts: Vec<Point> = best.map(|best| best.at).into_iter().collect();
+        starts.extend(&self.modes);
+        let scatter = best.map_or(0.01, |best| best.at[SCATTER].exp());
+        let space = &self.scales.space;
+        starts.extend(laws.iter().filter_map(|law| space.of_law(law, scatter)));
+        let each = starts.iter();
+        let mut found: Vec<Mode> = each
+            .flat_map(|start| modes_from(start, &mut self.scales))
+            .collect();
+        // A law that two descents ended at counts once.
+        found.sort_by(|a, b| b.ln.total_cmp(&a.ln));
+        found.dedup_by(|a, b| (a.ln - b.ln).abs() < SAME);
+        found
+    }
+
+    /// Chooses the population by the root of the posterior, or by as much a lower power as leaves it enough different laws.
+    fn choose_many(&mut self, tried: &[Walker]) {
+        let mut power = 0.5;
+        loop {
+            let shares = shares_of_power(tried.iter().map(|one| one.ln), power);
+            if shares.is_empty() {
+                return;
+            }
+            let squares: f64 = shares.iter().map(|share| share * share).sum();
+            if squares * ENOUGH_APART <= 1.0 || power < LEAST_POWER {
+                let chosen = in_proportion(shares.into_iter(), WALKERS);
+                self.walkers = chosen.into_iter().map(|index| tried[index]).collect();
+                return;
+            }
+            power *= 0.5;
+        }
+    }
+
+    /// Laws of the population that are far less likely than its best come to rest late: each is put where one of the others is.
+    pub(super) fn leave_behind(&mut self) {
+        let lns = self.walkers.iter().map(|one| one.ln);
+        let least = lns.fold(f64::NEG_INFINITY, f64::max) - FAR_BEHIND;
+        let kept = self.walkers.iter().filter(|one| one.ln >= least);
+        let kept: Vec<Walker> = kept.copied().collect();
+        if kept.len() < FEWEST_KEPT {
+            return;
+        }
+        for walker in &mut self.walkers {
+            if walker.ln < least {
+                *walker = kept[self.generator.random_range(0..kept.len())];
+            }
+        }
+    }
+
+    /// Whether a law that a descent found is likelier than this by so much that the population cannot be about it.
+    pub(super) fn knows_likelier(&mut self, ln: f64) -> bool {
+        let scales = &mut self.scales;
+        let mut each = self.modes.iter();
+        each.any(|mode| scales.ln_posterior(mode, f64::NEG_INFINITY) > ln + LIKELIER)
     }
 
     /// Moves each law of the population once.
@@ -175,12 +288,16 @@ impl Walk {
     /// Doubts the rates that the best law so far cannot explain, and weighs the population again.
     pub(super) fn doubt(&mut self) {
         let best = self.walkers.iter().max_by(|a, b| a.ln.total_cmp(&b.ln));
-        let Some(at) = best.map(|best| best.at) else {
-            return;
-        };
+        if let Some(at) = best.map(|best| best.at) {
+            self.doubt_by(&at);
+        }
+    }
+
+    /// Doubts the rates that this law cannot explain, and weighs the population again.
+    fn doubt_by(&mut self, at: &Point) {
         let scales = &mut self.scales;
-        let (_, gains, _) = scales.weigh(&at, f64::NEG_INFINITY);
-        let lane = (0, scales.space.noise(&at).scatter);
+        let (_, gains, _) = scales.weigh(at, f64::NEG_INFINITY);
+        let lane = (0, scales.space.noise(at).scatter);
         let squares = evidence::misses(&scales.record, &scales.predicted, lane, &gains);
         scales.record.doubt(&squares);
         for walker in &mut self.walkers {
@@ -204,6 +321,7 @@ impl Walk {
                 started,
                 variance: noise.scatter.powi(2) + noise.sigma.powi(2),
                 deviate,
+                ln: walker.ln,
             }));
         }
         drawn

@@ -111,7 +111,14 @@ impl SiteReader {
         let levels = in_force(&self.store, at)?;
         let orders = TakenOrders::read(&self.store, at)?;
         let span = self.store.span(None)?;
-        let known = self.known()?.into_iter();
+        let unwritten = self.vitals.as_ref().filter(|vitals| {
+            let health = vitals.health();
+            at.is_none() && !health.is_store_writable && health.is_caught_up
+        });
+        let points = unwritten.map_or_else(BTreeMap::new, |vitals| vitals.points());
+        let mut known = self.known()?;
+        known.extend(points.keys().cloned());
+        let known = known.into_iter();
         // What is known of one that is not watched any more is of the past.
         let benchmarks = known.filter(|one| at.is_some() || self.facts().watched.includes(one));
         let alarms = Alarms::read(&self.store, at, moment, &self.facts().declared)?;
@@ -129,13 +136,8 @@ impl SiteReader {
                 .filter(|_| at.is_some())
         });
         let mut benchmarks: Vec<Standing> = benchmarks.collect::<Result<_, _>>()?;
-        let unwritten = self.vitals.as_ref().filter(|vitals| {
-            let health = vitals.health();
-            at.is_none() && !health.is_store_writable && health.is_caught_up
-        });
         let mut level = called.unwrap_or(Level::Green);
-        if let Some(vitals) = unwritten {
-            let points = vitals.points();
+        if unwritten.is_some() {
             for one in &mut benchmarks {
                 one.overlay(&points, moment);
             }
