@@ -108,7 +108,10 @@ fn of_gaps(problem: &Problem, driver: &Driver) -> Option<String> {
     }
     let more = each.len().saturating_sub(NAMED_GAPS);
     each.truncate(NAMED_GAPS);
-    let rest = (more > 0).then(|| format!("and in {more} more gaps"));
+    let rest = (more > 0).then(|| {
+        let plural = if more == 1 { "" } else { "s" };
+        format!("and in {more} more gap{plural}")
+    });
     each.extend(rest);
     (!each.is_empty()).then(|| {
         format!(
