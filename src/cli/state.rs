@@ -87,12 +87,21 @@ pub(super) fn backup(args: &BackupArgs) -> anyhow::Result<()> {
     })
 }
 
-/// Whether there is, or was, a benchmark of this name.
-fn is_known(config: &Config, store: &Store, benchmark: &str) -> anyhow::Result<bool> {
-    let id = BenchmarkId::new(benchmark);
-    Ok(config.settings.watched.named.contains(&id)
-        || store.benchmarks()?.contains_key(&id)
-        || !store.events(0, None, Some(benchmark))?.is_empty())
+/// Whether the config names the benchmark, or it has given a reading.
+pub(super) fn is_known(
+    config: &Config,
+    store: &Store,
+    benchmark: &BenchmarkId,
+) -> anyhow::Result<bool> {
+    let is_named = config.benchmarks.iter().any(|one| one.id == *benchmark);
+    Ok(is_named || store.benchmarks()?.contains_key(benchmark))
+}
+
+/// What is said where it is not.
+pub(super) fn no_benchmark(benchmark: &BenchmarkId) -> anyhow::Error {
+    anyhow::anyhow!(
+        "there is no benchmark {benchmark}: the config names none, and none has given a reading"
+    )
 }
 
 /// Prints events.
@@ -101,12 +110,12 @@ pub(super) fn events(args: &EventsArgs) -> anyhow::Result<()> {
     let zone = &config.site.time_zone;
     let mut stdout = std::io::stdout().lock();
     let mut after = 0;
-    if let Some(benchmark) = args.benchmark.as_ref().filter(|_| !args.follow)
-        && !is_known(&config, &store, benchmark)?
-    {
-        anyhow::bail!(
-            "there is no benchmark {benchmark}: the config names none, and none has given a reading"
-        );
+    if let Some(benchmark) = args.benchmark.as_ref().filter(|_| !args.follow) {
+        // One that was there has events.
+        let id = BenchmarkId::new(benchmark);
+        if !is_known(&config, &store, &id)? && store.events(0, None, Some(benchmark))?.is_empty() {
+            return Err(no_benchmark(&id));
+        }
     }
     loop {
         let events = store.events(after, args.kind.as_deref(), args.benchmark.as_deref())?;

@@ -152,6 +152,7 @@ mod tests {
             assert!(is_named, "{copy}: {:?}", said.remarks);
         }
     }
+
     #[test]
     fn a_gap_in_a_channel_is_named() {
         let (series, mut channels) = driven_by_the_lake();

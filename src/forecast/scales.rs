@@ -181,9 +181,8 @@ fn stated_change(quantity: Quantity, values: &[Observation]) -> f64 {
     if quantity == Quantity::Velocity || stated.is_empty() {
         return 0.0;
     }
-    let middle = stated.len() / 2;
     // x0 - 2 x1 + x2.
-    *stated.select_nth_unstable_by(middle, f64::total_cmp).1 * 6.0_f64.sqrt()
+    median(&mut stated) * 6.0_f64.sqrt()
 }
 
 impl Curve {
@@ -393,12 +392,11 @@ impl Blocks {
         // The one next to the newest shares a block with it.
         let highest = before.iter().skip(1).copied().fold(0.0, f64::max);
         let velocity = (means[0] - means[1]) / self.days;
-        let middle = before.len() / 2;
         Some(Scale {
             days: self.days,
             velocity,
             highest_velocity: highest,
-            median_velocity: *before.select_nth_unstable_by(middle, f64::total_cmp).1,
+            median_velocity: median(&mut before),
             near,
             far,
             jump: curve.jump(self.days, near.usual),
@@ -422,8 +420,7 @@ impl Blocks {
         if sizes.len() < FEWEST_CHANGES {
             return None;
         }
-        let middle = sizes.len() / 2;
-        let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let median = median(&mut sizes);
         if median < LEAST_CHANGE_MM {
             return None;
         }

@@ -5,7 +5,7 @@ use crate::fit::{LawDraws, Rate};
 
 /// Said where the parameters have no intervals although there are readings enough.
 const UNSETTLED: &str = "The parameters have no intervals: the laws that were drawn from what the readings leave open did not spread over it, \
-     as where readings scatter far less than laws can be told apart by. Go by the best fit, without an error.";
+     as where readings scatter far less than laws can be distinguished by. Go by the best fit, without an error.";
 /// Said where the two regimes differ after the velocity has stood still.
 const STOOD_STILL: &str = "The two regimes differ, and the newest readings do not decide between them: over the last third of the record the \
      velocity stayed the same within 10 %. What they disagree about is whether the slope will gather speed again. The first lets the \

@@ -7,7 +7,7 @@ mod words;
 
 use super::args::OutputFormat;
 use super::exit::UsageError;
-use super::state::SiteArgs;
+use super::state::{SiteArgs, is_known, no_benchmark};
 use super::text;
 use crate::alert::Level;
 use crate::config::{Config, EXERCISE, value};
@@ -155,18 +155,12 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
         return Ok(());
     };
     let (config, store) = site.open()?;
-    let is_known =
-        |benchmark: &BenchmarkId| config.benchmarks.iter().any(|one| one.id == *benchmark);
     let is_of_a_drill = is_of_a_drill(&config, &order);
     if let Some(benchmark) = order.benchmark()
         && !is_of_a_drill
-        && !is_known(benchmark)
-        && !store.benchmarks()?.contains_key(benchmark)
+        && !is_known(&config, &store, benchmark)?
     {
-        let error = anyhow::anyhow!(
-            "there is no benchmark {benchmark}: the config names none, and none has given a reading"
-        );
-        return Err(unwritten::explained(&config, error));
+        return Err(unwritten::explained(&config, no_benchmark(benchmark)));
     }
     if let Some(silence) = silence_of_the_site(&store, &order, clock::now())? {
         let silence = text::line(&silence, &config.site.time_zone);

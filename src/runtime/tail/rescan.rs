@@ -72,7 +72,6 @@ impl Follower {
     /// Looks for files that have come or gone.
     pub(super) fn rescan(&mut self) {
         let mut listing = self.list();
-        listing.known = self.places();
         let mut renamed = self.first_names();
         let sources = &self.sources;
         let may_be_there = |key: &FileKey, file: &FileTail| {
@@ -89,6 +88,9 @@ impl Follower {
                 None => (!may_be_there(key, file)).then(|| key.clone()),
             })
             .collect();
+        if !gone.is_empty() {
+            listing.known = self.places();
+        }
         // All of them first: the new name of one may be the former name of another.
         let gone: Vec<(FileKey, FileTail)> = gone
             .into_iter()

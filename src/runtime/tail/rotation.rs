@@ -5,8 +5,10 @@ use super::file::{Content, FileTail};
 use super::follow::{FileKey, Follower};
 use super::position::FileId;
 use super::text::{LinesRead, TextReader};
+use crate::runtime::ingest::{is_packed, unpacked_name};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What a rotation appends to a name, or puts before it, beside digits and what stands between them.
 const WORDS: [&str; 5] = ["old", "bak", "prev", "T", "Z"];
@@ -34,14 +36,11 @@ impl Follower {
     /// A file that is followed from here on. Where it is a renamed one, packed, it keeps the first name of that; where another one stood
     /// under its name before, what it holds without a header is read by the header of that.
     pub(super) fn newly_followed(&self, key: &FileKey, renamed: &FirstNames) -> FileTail {
-        let decoder = std::sync::Arc::clone(&self.sources[key.0].decoder);
-        let plain =
-            (key.1.extension().is_some_and(|it| it == "gz")).then(|| key.1.with_extension(""));
+        let decoder = Arc::clone(&self.sources[key.0].decoder);
+        let plain = is_packed(&key.1).then(|| unpacked_name(&key.1));
         let first = plain.and_then(|plain| renamed.get(&(key.0, plain)));
-        let mut file = FileTail::new(
-            first.map_or_else(|| key.1.clone(), |it| packed(it)),
-            decoder,
-        );
+        let first = first.map_or_else(|| key.1.clone(), |name| packed(name));
+        let mut file = FileTail::new(first, decoder);
         file.path.clone_from(&key.1);
         let before = self
             .files

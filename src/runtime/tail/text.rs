@@ -53,11 +53,7 @@ impl TextReader {
 
     /// A reader of a text that goes on below these lines of a header, which stand in another file.
     pub(super) fn below(mut rows: TextRows, header: &[String]) -> Option<Self> {
-        for (number, line) in (1..).zip(header) {
-            if rows.take(number, line).fault.is_some() {
-                return None;
-            }
-        }
+        take_header(&mut rows, header).ok()?;
         (!rows.is_lost()).then(|| Self::new(rows))
     }
 
@@ -79,11 +75,7 @@ impl TextReader {
     /// # Errors
     /// When the header is no longer understood: the config is another.
     pub(super) fn restored(mut rows: TextRows, saved: SavedText) -> Result<Self, IngestError> {
-        for (number, line) in (1..).zip(&saved.header) {
-            if let Some(fault) = rows.take(number, line).fault {
-                return Err(fault);
-            }
-        }
+        take_header(&mut rows, &saved.header)?;
         if !saved.header.is_empty() && rows.is_lost() {
             return Err(IngestError::NoHeader {
                 file: "the file".into(),
@@ -164,6 +156,16 @@ impl TextReader {
     pub(in crate::runtime) fn is_within_a_line(&self) -> bool {
         self.lines.is_within_a_line()
     }
+}
+
+/// Takes the lines of a header that was read before.
+fn take_header(rows: &mut TextRows, header: &[String]) -> Result<(), IngestError> {
+    for (number, line) in (1..).zip(header) {
+        if let Some(fault) = rows.take(number, line).fault {
+            return Err(fault);
+        }
+    }
+    Ok(())
 }
 
 /// What of a [`TextReader`] a restart needs.

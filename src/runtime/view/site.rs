@@ -198,7 +198,7 @@ impl SiteReader {
             is_unknown: newest.is_none() || unknown_since.is_some(),
             unknown_since,
             newest_reading: newest,
-            silent_seconds: newest.map(|newest| moment.duration_since(newest).as_secs().max(0)),
+            silent_seconds: silent_seconds(newest, moment),
             position: self.facts().positions.get(&benchmark).cloned(),
             forecast_at: None,
             velocity_mm_per_day: None,
@@ -237,6 +237,11 @@ impl SiteReader {
     }
 }
 
+/// How long before `moment` the newest reading was measured.
+fn silent_seconds(newest: Option<Timestamp>, moment: Timestamp) -> Option<i64> {
+    newest.map(|newest| moment.duration_since(newest).as_secs().max(0))
+}
+
 impl Standing {
     /// As the daemon knows it, which could not write it.
     fn overlay(&mut self, points: &BTreeMap<BenchmarkId, VitalsPoint>, moment: Timestamp) {
@@ -253,8 +258,7 @@ impl Standing {
             (self.is_unknown, self.unknown_since) = (point.is_unknown, None);
         }
         self.newest_reading = point.newest.max(self.newest_reading);
-        let silent = |newest| moment.duration_since(newest).as_secs().max(0);
-        self.silent_seconds = self.newest_reading.map(silent);
+        self.silent_seconds = silent_seconds(self.newest_reading, moment);
     }
 
     fn forecast(&mut self, refit: &Event) {
