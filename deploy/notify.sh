@@ -5,7 +5,7 @@
 # With a file's name as argument the line is appended there.
 set -eu
 cat >/dev/null  # a hook may leave stdin unread; a real one reads the JSON here
-line="[$SLIPWATCH_STATUS] $SLIPWATCH_SITE: $SLIPWATCH_LEVEL $SLIPWATCH_STATE at benchmark ${SLIPWATCH_BENCHMARK:-(site)}, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+, failure expected $SLIPWATCH_FAILURE_TIME}"
+line="[$SLIPWATCH_STATUS] $SLIPWATCH_SITE: $SLIPWATCH_LEVEL $SLIPWATCH_STATE at benchmark ${SLIPWATCH_BENCHMARK:-(site)}, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+, failure expected $SLIPWATCH_FAILURE_TIME}${SLIPWATCH_TEXT:+. $SLIPWATCH_TEXT}"
 if [ $# -gt 0 ]; then
     echo "$line" >>"$1"
 else

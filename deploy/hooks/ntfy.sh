@@ -21,7 +21,7 @@ if [ "${SLIPWATCH_COUNT:-1}" -gt 1 ]; then
     place="$SLIPWATCH_COUNT benchmarks"
 fi
 title="[$SLIPWATCH_STATUS] $(plain "$SLIPWATCH_SITE"): $SLIPWATCH_LEVEL $SLIPWATCH_STATE"
-text="$place, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+; median forecast of the collapse $SLIPWATCH_FAILURE_TIME}"
+text="$place, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+; median forecast of the collapse $SLIPWATCH_FAILURE_TIME}${SLIPWATCH_TEXT:+. $SLIPWATCH_TEXT}"
 token_file="$(dirname "$0")/ntfy.token"
 if [ -r "$token_file" ]; then
     # Over standard input: the command line can be read by everyone on the machine.

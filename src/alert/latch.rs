@@ -62,10 +62,17 @@ struct SteadyStretch {
     since: Timestamp,
     velocity: f64,
     readings: usize,
+    /// The newest reading of it, and the longest time without one. None in states of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    newest: Option<Timestamp>,
+    #[serde(default, skip_serializing_if = "SignedDuration::is_zero")]
+    longest_gap: SignedDuration,
 }
 
 /// Readings that make a stretch, however far apart.
 const FEWEST_READINGS: usize = 4;
+/// No gap between two of them is longer than the stretch over this.
+const SEEN: i32 = 2;
 /// Motion that does not gain stays under this factor of what it was when the stretch began.
 const STEADY_GAIN: f64 = 1.2;
 /// A settled velocity differs from another, or from rest, that is so many times its standard error.
@@ -103,19 +110,27 @@ impl SteadyStretch {
             since: now,
             velocity,
             readings: 0,
+            newest: None,
+            longest_gap: SignedDuration::ZERO,
         };
         let most = |stretch: &Self| STEADY_GAIN * stretch.velocity + CLEAR * error;
         let going_on = stretch.filter(|stretch| velocity <= most(stretch));
         let stretch = going_on.unwrap_or(begin);
+        let gap = stretch.newest.map(|newest| now.duration_since(newest));
         Some(Self {
             readings: stretch.readings + 1,
+            newest: Some(now),
+            longest_gap: stretch.longest_gap.max(gap.unwrap_or_default()),
             ..stretch
         })
     }
 
     fn lasts(stretch: Option<Self>, now: Timestamp, span: SignedDuration) -> Holds {
         let lasts = stretch.is_some_and(|stretch| {
-            stretch.readings >= FEWEST_READINGS && now.duration_since(stretch.since) >= span
+            let length = now.duration_since(stretch.since);
+            // Nobody has seen how the slope moved in a gap.
+            let is_seen = stretch.longest_gap.saturating_mul(SEEN) <= length;
+            stretch.readings >= FEWEST_READINGS && length >= span && is_seen
         });
         Holds::from(lasts)
     }
@@ -218,7 +233,10 @@ impl Latch {
         // Motion that never stood out of its error has not to slow down.
         let is_slow = self.has_slowed_to(velocity, error) || self.peak_velocity <= 0.0;
         let slowed = less && is_slow;
-        let steady = less && velocity < policy.critical_velocity_mm_per_day;
+        // A slope that has become faster since the level was called is not over it while more than nothing is called.
+        let is_no_faster = velocity <= STEADY_GAIN * self.first_velocity + CLEAR * error;
+        let is_over = is_no_faster || self.first_velocity <= 0.0 || call.level == Level::Green;
+        let steady = less && is_over && velocity < policy.critical_velocity_mm_per_day;
         let motion = (velocity, error);
         self.slow = SteadyStretch::go_on(self.slow, slowed.into(), evidence.now, motion);
         self.steady = SteadyStretch::go_on(self.steady, steady.into(), evidence.now, motion);
@@ -421,6 +439,38 @@ mod tests {
         }
         let fall = latch.update(&policy, &evidence(7 * 24 + 1, 0.0, 95.0));
         assert_eq!(fall[0].rule, "steady");
+    }
+
+    #[test]
+    fn a_slope_that_is_twice_as_fast_as_at_the_call_is_over_it_only_where_nothing_is_called() {
+        let (policy, latch) = red_at_hundred();
+        let after = |chance: f64| {
+            let mut latch = latch.clone();
+            for hour in 1..20 * 24 {
+                let creeps = 200.0 + 0.1 * f64::from(u8::try_from(hour / 24).unwrap());
+                let outlook = AlertEvidence {
+                    chance_within_outlook: Some(chance),
+                    ..evidence(hour, 0.0, creeps)
+                };
+                latch.update(&policy, &outlook);
+            }
+            latch.level()
+        };
+        assert_eq!(after(0.5), Level::Red);
+        assert_eq!(after(0.0), Level::Green);
+    }
+
+    #[test]
+    fn a_gap_in_the_readings_is_no_steady_motion() {
+        let (policy, mut latch) = red_at_hundred();
+        for hour in (1..=24).chain(12 * 24..15 * 24) {
+            latch.update(&policy, &evidence(hour, 0.0, 95.0));
+            assert_eq!(latch.level(), Level::Red, "hour {hour}");
+        }
+        for hour in 15 * 24..24 * 24 {
+            latch.update(&policy, &evidence(hour, 0.0, 95.0));
+        }
+        assert_eq!(latch.level(), Level::Green);
     }
 
     #[test]

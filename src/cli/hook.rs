@@ -122,7 +122,7 @@ fn test(args: &Test) -> anyhow::Result<()> {
             hook: hook.name(),
             level,
             is_taken: outcome == HookOutcome::Done,
-            outcome: said(&outcome),
+            outcome: outcome.in_words(),
         });
     }
     let status = Status::Test.name();
@@ -162,17 +162,6 @@ fn drill(config: &Config, hook: &HookConfig, level: Level, now: Timestamp) -> Op
         kind,
     };
     Alert::new(&event, &config.site.name, None, Status::Test)
-}
-
-fn said(outcome: &HookOutcome) -> String {
-    match outcome {
-        HookOutcome::Done => "done".to_owned(),
-        HookOutcome::Failed(code) => format!("ended with exit code {code}"),
-        HookOutcome::Signalled(signal) => format!("ended by signal {signal}"),
-        HookOutcome::TimedOut => "killed when its time was up".to_owned(),
-        HookOutcome::Refused(status) => format!("answered with status {status}"),
-        HookOutcome::NotStarted(why) => format!("not started: {why}"),
-    }
 }
 
 fn text(report: &HookReport) -> String {

@@ -1,5 +1,6 @@
 //! Which covariates count as evidence: each once, and only those that cover the record.
 
+use super::calendar::is_of_the_calendar;
 use super::problem::Problem;
 use super::response::Driver;
 use crate::reading::{Channel, after_days};
@@ -80,6 +81,13 @@ pub(super) fn drivers(
 ) -> Vec<Driver> {
     let mut drivers = Vec::new();
     for (index, channel) in channels.iter().enumerate() {
+        if is_of_the_calendar(channel) {
+            remarks.push(format!(
+                "{} was left out: it says when the readings were made, and is no covariate.",
+                channel.name
+            ));
+            continue;
+        }
         let Some(driver) = Driver::new(index, channel, problem.epoch) else {
             continue;
         };

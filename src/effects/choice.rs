@@ -2,7 +2,7 @@
 
 use super::act::Act;
 use super::companions::{go_together, is_rain};
-use super::judge::{block, named};
+use super::judge::{block, jumps_at_once, named};
 use super::kind::Kind;
 use super::prior::Prior;
 use super::refit::Fitted;
@@ -126,6 +126,10 @@ impl Search<'_> {
         let share = self.options.held_out_share;
         block(self.problem, &one.fitted.terms, share)?;
         let slow = self.slow_load(base)?;
+        if one.term.is_jump_of_reading() && jumps_at_once(self.problem, &slow.fitted) {
+            // What acts between two readings is not slow: it follows the same jump.
+            return None;
+        }
         let more = slow.gain - most;
         if more < self.options.bic_margin {
             let less = -more;

@@ -157,7 +157,8 @@ pub struct Fault {
     pub at: Timestamp,
     /// Where it ends, where it is no instant.
     pub until: Option<Timestamp>,
-    /// The value, in `unit`; of a reset what has to be added to all that follows.
+    /// The value, in `unit`; of a reset what has to be added to all that follows, of a change of the unit how many times as large the values
+    /// are from there on.
     pub size: Option<f64>,
     /// The unit of `size`.
     pub unit: Option<String>,

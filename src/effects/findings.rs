@@ -24,8 +24,9 @@ use super::verdict::{LARGEST_REST, Verdict, contribution};
 use crate::reading::{Unit, after_days};
 use std::collections::BTreeMap;
 
-/// What is left is no noise where a test gives it less than this p-value.
+/// What is left is no noise where a test gives it less than this p-value, and nothing is explained in full under the second one.
 const LEFT_OVER: f64 = 0.001;
+const NOT_IN_FULL: f64 = 0.005;
 
 /// A white noise of so many times what the readings' digits leave open is noise that they show.
 const CLEAR_OF_DIGITS: f64 = 1.5;
@@ -120,7 +121,7 @@ pub(super) fn findings(
     let explained = confirmed(explained, &full, &noise, &error, &residual);
     // Nothing was found, and yet what is left is no noise, nor what the digits leave open.
     let is_read = full.sigma > CLEAR_OF_DIGITS * problem.rounding;
-    if effects[0].effect == Kind::NONE && is_read && is_contradicted(&residual) {
+    if effects[0].effect == Kind::NONE && is_read && is_contradicted(&residual, LEFT_OVER) {
         effects[0] = Effect::of(Kind::UNEXPLAINED);
     }
     let curves = curves(problem, by_least_squares, held.as_ref(), unit, left);
@@ -229,7 +230,7 @@ fn confirmed(
     // What remembers in the residual may pass for an instrument's only while it is small.
     let rest = error.fit.after.unwrap_or(0.0);
     let is_large = !full.terms.is_empty() && rest > LARGEST_REST * noise.white;
-    if explained == Explained::Full && (is_large || is_contradicted(residual)) {
+    if explained == Explained::Full && (is_large || is_contradicted(residual, NOT_IN_FULL)) {
         Explained::Partly
     } else {
         explained
@@ -252,9 +253,9 @@ fn with_effects(mut curves: Curves, ready: &Ready, full: &Fitted, scratch: &mut 
 }
 
 /// Whether a test of what is left says that it is no noise.
-fn is_contradicted(residual: &ResidualTests) -> bool {
+fn is_contradicted(residual: &ResidualTests, least: f64) -> bool {
     let values = [residual.runs.after, residual.stoffer_toloi.after];
-    values.into_iter().flatten().any(|p| p < LEFT_OVER)
+    values.into_iter().flatten().any(|p| p < least)
 }
 
 /// The law with the effects of `full`, by least squares over all readings: no farther from them than the `plain` law, which is the

@@ -127,7 +127,7 @@ fn within_a_gap(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) -> Optio
 }
 
 /// Whether the motion goes half of its whole way from one reading to the next, jumps of the reading left out.
-fn jumps_at_once(problem: &Problem, fitted: &Fitted) -> bool {
+pub(super) fn jumps_at_once(problem: &Problem, fitted: &Fitted) -> bool {
     let predicted = &fitted.prediction;
     if problem.quantity == Quantity::Velocity || predicted.len() < 2 {
         return false;

@@ -246,6 +246,8 @@ pub enum FaultKind {
     Outlier,
     /// A value its unit does not allow, or a logger's code for no value.
     OutOfRange,
+    /// From here on all values are so many times as large: they are in another unit.
+    UnitSlip,
 }
 
 impl FaultKind {
@@ -258,6 +260,7 @@ impl FaultKind {
             Self::Interpolated => "interpolated",
             Self::Outlier => "outlier",
             Self::OutOfRange => "out-of-range",
+            Self::UnitSlip => "unit-slip",
         }
     }
 }

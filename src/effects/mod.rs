@@ -4,6 +4,7 @@ mod act;
 mod backward;
 mod blur;
 mod by_clock;
+mod calendar;
 mod candidates;
 mod clock;
 mod companions;

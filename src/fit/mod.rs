@@ -22,7 +22,7 @@ pub(crate) use damped::{Damping, Descendable, StepOutcome, descend};
 pub use lattice::Lattice;
 pub use point_readings::PointReadings;
 pub use rates::{FINEST_DAYS, Observation, Observations, Rate, RateOptions, ReadingError};
-pub(crate) use rates::{displacement_sigma, widen_merged};
+pub(crate) use rates::{displacement_sigma, velocity_sigma, widen_merged};
 pub use solution::{EndOfSearch, Exponent, Solution};
 pub use under_load::{
     Assumptions, Ensemble, LawDraws, LawSample, LoadPosterior, Onset, OtherPrior, P_PRIOR,

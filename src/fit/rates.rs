@@ -87,6 +87,10 @@ const LONGEST_SHARE: f64 = 1.0 / 16.0;
 
 /// Noise floor of a displacement series without scatter, mm.
 const LEAST_DISPLACEMENT_SIGMA_MM: f64 = 1e-3;
+/// The share of a velocity that is its own roughness.
+const ROUGH: f64 = 0.1;
+/// Fewest velocities whose scatter is known.
+const FEWEST_VELOCITIES: usize = 8;
 /// Readings have a resolution that shows where at least this share of the steps between them is none, and where of the others at least
 /// this share are multiples of the shortest one.
 const WITHOUT_STEP: f64 = 1.0 / 3.0;
@@ -165,28 +169,34 @@ impl Observations {
         spaced
     }
 
-    /// Overlapping windows repeat each other: readings are kept half a window apart at least.
+    /// Overlapping windows repeat each other: readings are kept half a window apart at least. Those without a stated error have that of
+    /// their scatter about the line between their neighbours.
     fn velocity_rates(&self, values: &[Observation]) -> Vec<Rate> {
         let spacing = self.spacing_days();
-        let mut rates: Vec<Rate> = Vec::new();
+        let mut kept: Vec<Observation> = Vec::new();
         for value in values.iter().rev() {
-            if rates
+            let apart = kept
                 .last()
-                .is_some_and(|later| later.to - value.t_days < spacing * 0.999)
-            {
-                continue;
+                .is_none_or(|later| later.t_days - value.t_days >= spacing * 0.999);
+            if apart {
+                kept.push(*value);
             }
-            rates.push(Rate {
-                from: value.t_days - self.averaging_days,
-                to: value.t_days,
-                velocity: value.value,
-                sigma: value.sigma.unwrap_or(0.0),
-                readings: 1,
-                error: ReadingError::Own,
-            });
         }
-        rates.reverse();
-        rates
+        kept.reverse();
+        let scatter = if kept.iter().all(|value| value.sigma.is_some()) {
+            0.0
+        } else {
+            velocity_sigma(&kept)
+        };
+        let rates = kept.iter().map(|value| Rate {
+            from: value.t_days - self.averaging_days,
+            to: value.t_days,
+            velocity: value.value,
+            sigma: value.sigma.unwrap_or(scatter),
+            readings: 1,
+            error: ReadingError::Own,
+        });
+        rates.collect()
     }
 }
 
@@ -217,23 +227,50 @@ fn resolution_sigma(values: &[Observation]) -> f64 {
 /// The standard error of one displacement reading, mm: from how far each stands from the line between
 /// its neighbours, by the median, so that neither steps nor acceleration raise it; no less than rounding makes it.
 pub(crate) fn displacement_sigma(values: &[Observation]) -> f64 {
-    let mut misfits: Vec<f64> = values
-        .windows(3)
-        .map(|w| {
-            let share = (w[1].t_days - w[0].t_days) / (w[2].t_days - w[0].t_days);
-            let line = w[0].value + share * (w[2].value - w[0].value);
-            let size = (1.0 + share * share + (1.0 - share) * (1.0 - share)).sqrt();
-            (w[1].value - line).abs() / size
-        })
-        .collect();
+    let mut misfits: Vec<f64> = values.windows(3).map(misfit).collect();
+    let least = LEAST_DISPLACEMENT_SIGMA_MM;
     if misfits.is_empty() {
-        return LEAST_DISPLACEMENT_SIGMA_MM;
+        return least;
     }
-    let middle = misfits.len() / 2;
-    let (_, median, _) = misfits.select_nth_unstable_by(middle, f64::total_cmp);
+    of_median(&mut misfits)
+        .max(resolution_sigma(values))
+        .max(least)
+}
+
+/// The same of one velocity reading, mm/day; 0 where the readings scatter no more than motion does. Motion that is fast is rough: only the
+/// slower half shows the instrument, and of that not what is a small share of its velocity, for which the law's own scatter accounts. (How far
+/// the middle one of three stands from its neighbours does not depend on the mean of the three.)
+pub(crate) fn velocity_sigma(values: &[Observation]) -> f64 {
+    if values.len() < FEWEST_VELOCITIES {
+        return 0.0;
+    }
+    let mean = |three: &[Observation]| three.iter().map(|one| one.value).sum::<f64>().abs() / 3.0;
+    let mut threes: Vec<(f64, f64)> = (values.windows(3))
+        .map(|three| (mean(three), misfit(three)))
+        .collect();
+    let half = threes.len() / 2;
+    threes.select_nth_unstable_by(half, |a, b| a.0.total_cmp(&b.0));
+    threes.truncate(half + 1);
+    let (_, usual, _) = threes.select_nth_unstable_by(half / 2, |a, b| a.0.total_cmp(&b.0));
+    let rough = ROUGH * usual.0;
+    let mut slower: Vec<f64> = threes.iter().map(|three| three.1).collect();
+    let scatter = of_median(&mut slower).max(resolution_sigma(values));
+    (scatter * scatter - rough * rough).max(0.0).sqrt()
+}
+
+/// How far the middle one of three readings stands from the line between the others, over what that is for readings of error 1.
+fn misfit(w: &[Observation]) -> f64 {
+    let share = (w[1].t_days - w[0].t_days) / (w[2].t_days - w[0].t_days);
+    let line = w[0].value + share * (w[2].value - w[0].value);
+    let size = (1.0 + share * share + (1.0 - share) * (1.0 - share)).sqrt();
+    (w[1].value - line).abs() / size
+}
+
+/// The standard deviation of normal variables of these sizes, of which there is at least one.
+fn of_median(sizes: &mut [f64]) -> f64 {
+    let middle = sizes.len() / 2;
     // The median of |normal| is 0.6745 of its standard deviation.
-    let least = resolution_sigma(values).max(LEAST_DISPLACEMENT_SIGMA_MM);
-    (*median / 0.6745).max(least)
+    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745
 }
 
 /// Readings that are one: their mean, and how far it may be off.

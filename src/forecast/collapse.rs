@@ -75,19 +75,19 @@ pub struct Indicators {
     scales: Scales,
     evidence: Evidence,
     /// The same of the readings since an event that stands out of all else: beside it no later acceleration would look like
-    /// one.
-    later: Option<Box<Self>>,
+    /// one. And the share of their chance that counts for levels.
+    later: Option<(f64, Box<Self>)>,
 }
 
 impl Indicators {
     /// Those of `observations`; `None` with too few of them.
     pub fn of(observations: &Observations) -> Option<Self> {
         let mut whole = Self::by(observations, Scales::of(observations)?);
-        let since = whole.scales.disturbed_days;
-        let later = since.and_then(|ago| newest(observations, ago));
-        whole.later = later.and_then(|later| {
+        whole.later = whole.scales.disturbed.and_then(|event| {
+            let later = newest(observations, event.days)?;
             let scales = Scales::at(&later, later.values.len())?;
-            Some(Box::new(Self::by(&later, scales)))
+            let later = Self::by(&later, scales);
+            Some((LATER * event.share, Box::new(later)))
         });
         Some(whole)
     }
@@ -127,7 +127,7 @@ impl Indicators {
             .map(|(_, span)| self.most(span));
         let later = self.later.as_ref();
         counted.any(|most| most >= chance)
-            || later.is_some_and(|later| later.may_reach(days, chance / LATER))
+            || later.is_some_and(|(share, later)| later.may_reach(days, chance / share))
     }
 
     /// The inputs of every span with its length, days.
@@ -146,9 +146,9 @@ impl Indicators {
     pub fn collapse_by(&self, network: &Network, members: &Members) -> Collapse {
         let (all, sure) = self.chances_by(network, members);
         let sure = match &self.later {
-            Some(later) => {
+            Some((share, later)) => {
                 let (_, since) = later.chances_by(network, members);
-                sure.at_least(&Passage::default().pooled(&since, LATER))
+                sure.at_least(&Passage::default().pooled(&since, *share))
             }
             None => sure,
         };

@@ -1,6 +1,7 @@
 //! What is expected of a slope: the collapse by what slopes of many kinds did, and, by the law under an undeclared
 //! load averaged over its shapes and its starts, the regime and the passage of a critical velocity.
 
+use super::excursions::without_excursions;
 use super::surprise::Surprise;
 use super::{Indicators, Members, Passage};
 use crate::fit::{Ensemble, LoadPosterior, Observation, Observations, Rate, RateOptions};
@@ -158,6 +159,7 @@ pub(crate) fn outlook(
     if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
         return None;
     }
+    let observations = &*without_excursions(observations);
     let now_days = observations.values.last()?.t_days;
     let rates = observations.rates(0..observations.values.len(), RateOptions::default());
     let posterior = LoadPosterior::fit(&rates);
@@ -275,7 +277,7 @@ impl NewestReading {
                 let seen = crate::fit::displacement_sigma(&observations.values);
                 stated.max(seen) * std::f64::consts::SQRT_2
             }
-            Quantity::Velocity => stated,
+            Quantity::Velocity => velocity_noise(observations, newest),
         };
         Some(Self {
             t_days: newest.t_days,
@@ -283,6 +285,12 @@ impl NewestReading {
             noise,
         })
     }
+}
+
+/// The standard error of a velocity, mm/day: as stated, or as the readings scatter.
+fn velocity_noise(observations: &Observations, reading: &Observation) -> f64 {
+    let seen = || crate::fit::velocity_sigma(&observations.values);
+    reading.sigma.unwrap_or_else(seen)
 }
 
 fn unknown() -> BTreeMap<Regime, f64> {
@@ -316,7 +324,7 @@ impl Newest {
             Quantity::Velocity => (
                 newest.t_days - observations.averaging_days,
                 newest.value,
-                stated,
+                velocity_noise(observations, newest),
             ),
             Quantity::Displacement => {
                 let span = newest.t_days - before.t_days;

@@ -4,8 +4,9 @@
 //! A forecast rests on the newest velocity and the newest change of each scale, and on how large such changes were
 //! before: a change that is usual for the instrument or for the slope is no evidence of anything.
 
+use super::past_event::{LEAST_CHANGE_MM, PastEvent, median, past_events};
 use super::sessions::{SPANS, merged};
-use crate::fit::{Observation, Observations};
+use crate::fit::{Observation, Observations, velocity_sigma};
 use crate::reading::Quantity;
 
 /// No block is shorter, days: a quarter of an hour.
@@ -18,25 +19,12 @@ const FEWEST_READINGS: usize = 6;
 /// So many of the newest spans between readings say how a slope is read now, where they are shorter than this share of the usual one.
 const SPANS_NOW: usize = 24;
 const OFTENER: f64 = 0.25;
-/// A change is never known better than this, mm.
-const LEAST_CHANGE_MM: f64 = 1e-4;
 /// The usual change of the next shorter scale counts as much as so many observed ones.
 const PRIOR_COUNT: f64 = 2.0;
 /// Changes of neighbouring blocks overlap: so many of them are worth one that is independent.
 const OVERLAP: f64 = 3.0;
 /// Of the degrees of freedom at a scale, what is worth as much at the next longer one.
 const CARRIED: f64 = 0.5;
-/// Fewest changes among which one may stand out, how many standard deviations it does, taken from the median size, and the most
-/// events that are not usual yet.
-const FEWEST_CHANGES: usize = 32;
-const OUTSTANDING: f64 = 10.0;
-const NORMAL_MEDIAN: f64 = 0.6745;
-const MOST_EVENTS: usize = 2;
-/// What lies within so many blocks, or this share of the record, is one event; and an event stands out that is so many times the
-/// largest that is usual.
-const ONE_EVENT: usize = 6;
-const EVENTS: usize = 12;
-const ABOVE_NEXT: f64 = 4.0;
 /// The largest ratio of a single step to the motion of a span.
 const MOST_JUMP: f64 = 3.0;
 
@@ -86,8 +74,8 @@ pub struct Scales {
     pub centred_before_days: f64,
     /// At least one.
     pub each: Vec<Scale>,
-    /// How long ago the newest of one or two events was over that stand out of all else in the record, days.
-    pub disturbed_days: Option<f64>,
+    /// The newest of one or two events that stand out of all else in the record.
+    pub disturbed: Option<PastEvent>,
 }
 
 /// Displacement over time as straight lines between readings; the newest reading is (0, 0).
@@ -137,25 +125,24 @@ impl Scales {
         let curve = Curve::of(observations.quantity, observations.averaging_days, values);
         let interval_days = curve.interval();
         let base_days = interval_days.max(FINEST_BLOCK_DAYS);
-        let stated = stated_change(observations.quantity, values);
+        let noise = ReadingNoise::of(observations, values, interval_days);
         let mut each: Vec<Scale> = Vec::new();
         let mut blocks = Blocks::default();
-        let (mut disturbed_days, mut is_usual) = (None::<f64>, false);
+        let (mut events_found, mut usual) = (Vec::new(), 0.0_f64);
         for power in 0..MOST_SCALES {
             blocks = curve.blocks(power, base_days, interval_days, &blocks);
-            let Some(scale) = blocks.scale(each.last(), stated, &curve) else {
+            let Some(scale) = blocks.scale(each.last(), noise, &curve) else {
                 break;
             };
             each.push(scale);
             if !events {
                 continue;
             }
-            match blocks.disturbance() {
-                Some(Disturbance::Over(days)) => {
-                    disturbed_days = Some(disturbed_days.map_or(days, |other| other.min(days)));
-                }
-                Some(Disturbance::Usual) => is_usual = true,
-                None => {}
+            if let Some((event, is_usual)) =
+                past_events(&blocks.means, &blocks.is_read, blocks.days)
+            {
+                events_found.extend(event);
+                usual = usual.max(is_usual);
             }
         }
         (!each.is_empty()).then_some(Self {
@@ -164,25 +151,40 @@ impl Scales {
             length_days: -curve.days[0],
             centred_before_days: 0.5 * observations.averaging_days,
             each,
-            disturbed_days: disturbed_days.filter(|_| !is_usual),
+            disturbed: PastEvent::newest(&events_found, usual),
         })
     }
 }
 
-/// The upper one of the two middle ones of an even number; `values` are not empty.
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+/// What the errors of the readings make of a change of velocity over blocks.
+#[derive(Debug, Clone, Copy)]
+struct ReadingNoise {
+    /// Of displacements of the stated standard error, mm; 0 where none is stated.
+    change_mm: f64,
+    /// Of velocities, whose errors add up: over blocks of a day, mm. It grows with the root of their length.
+    of_a_day_mm: f64,
 }
 
-/// What a change of displacements of the stated standard error is, mm; 0 where none is stated.
-fn stated_change(quantity: Quantity, values: &[Observation]) -> f64 {
-    let mut stated: Vec<f64> = values.iter().filter_map(|value| value.sigma).collect();
-    if quantity == Quantity::Velocity || stated.is_empty() {
-        return 0.0;
+impl ReadingNoise {
+    fn of(observations: &Observations, values: &[Observation], interval_days: f64) -> Self {
+        let mut stated: Vec<f64> = values.iter().filter_map(|value| value.sigma).collect();
+        let stated = (!stated.is_empty()).then(|| median(&mut stated));
+        match observations.quantity {
+            Quantity::Displacement => Self {
+                // x0 - 2 x1 + x2.
+                change_mm: stated.unwrap_or(0.0) * 6.0_f64.sqrt(),
+                of_a_day_mm: 0.0,
+            },
+            Quantity::Velocity => {
+                let apart = observations.averaging_days.max(interval_days);
+                let sigma = stated.unwrap_or_else(|| velocity_sigma(values));
+                Self {
+                    change_mm: 0.0,
+                    of_a_day_mm: sigma * apart.sqrt(),
+                }
+            }
+        }
     }
-    // x0 - 2 x1 + x2.
-    median(&mut stated) * 6.0_f64.sqrt()
 }
 
 impl Curve {
@@ -346,45 +348,20 @@ fn integrated(averaging_days: f64, values: &[Observation]) -> Vec<f64> {
     mm
 }
 
-/// What stands out of a record at one scale.
-enum Disturbance {
-    /// One or two events, of which the newest was over so many days ago.
-    Over(f64),
-    /// More than that: they are usual here.
-    Usual,
-}
-
-/// The largest of these (block, slow-down), largest first, each further than `apart` blocks from the larger ones.
-fn largest_events(slow: &[(usize, f64)], apart: usize) -> [f64; MOST_EVENTS + 1] {
-    let mut largest = [0.0; MOST_EVENTS + 1];
-    let mut places: Vec<usize> = Vec::new();
-    for event in &mut largest {
-        let others = slow
-            .iter()
-            .filter(|(block, _)| places.iter().all(|place| block.abs_diff(*place) > apart));
-        if let Some((block, size)) = others.max_by(|a, b| a.1.total_cmp(&b.1)) {
-            places.push(*block);
-            *event = *size;
-        }
-    }
-    largest
-}
-
 impl Blocks {
-    /// What the blocks show; `None` where there are fewer than three. `shorter` is the scale below, `stated` a change
-    /// of the stated error, mm.
-    fn scale(&self, shorter: Option<&Scale>, stated: f64, curve: &Curve) -> Option<Scale> {
+    /// What the blocks show; `None` where there are fewer than three. `shorter` is the scale below.
+    fn scale(&self, shorter: Option<&Scale>, noise: ReadingNoise, curve: &Curve) -> Option<Scale> {
         let means = &self.means;
         if means.len() < 3 {
             return None;
         }
         let prior = shorter.map(|scale| scale.near);
-        let near = self.change(1, stated, prior);
+        let near = self.change(1, noise, prior);
         let first = VelocityChange {
             freedom: PRIOR_COUNT,
             ..near
         };
-        let far = self.change(3, stated, Some(shorter.map_or(first, |scale| scale.far)));
+        let far = self.change(3, noise, Some(shorter.map_or(first, |scale| scale.far)));
         let mut before: Vec<f64> = means[1..]
             .windows(2)
             .map(|pair| (pair[0] - pair[1]) / self.days)
@@ -403,44 +380,13 @@ impl Blocks {
         })
     }
 
-    /// One or two events after which the slope slowed down by far more than ever else: a slide that stopped, a reset, a few
-    /// readings that were wrong. What happens more often is usual there. `None` without any.
-    fn disturbance(&self) -> Option<Disturbance> {
-        let count = self.means.len().checked_sub(2)?;
-        if count < FEWEST_CHANGES {
-            return None;
-        }
-        let at = |block: usize| {
-            let [a, b, c] = [0, 1, 2].map(|next| self.means[block + next]);
-            (a - b) - (b - c)
-        };
-        let read = (1..count).filter(|block| self.is_read[*block..block + 3].iter().all(|is| *is));
-        let changes: Vec<(usize, f64)> = read.map(|block| (block, at(block))).collect();
-        let mut sizes: Vec<f64> = changes.iter().map(|(_, change)| change.abs()).collect();
-        if sizes.len() < FEWEST_CHANGES {
-            return None;
-        }
-        let median = median(&mut sizes);
-        if median < LEAST_CHANGE_MM {
-            return None;
-        }
-        let slow: Vec<(usize, f64)> = (changes.iter())
-            .filter(|(_, change)| *change < 0.0)
-            .map(|(block, change)| (*block, -change))
-            .collect();
-        let largest = largest_events(&slow, ONE_EVENT.max(count / EVENTS));
-        let least = OUTSTANDING * median / NORMAL_MEDIAN;
-        let next = largest[MOST_EVENTS];
-        if next > least {
-            return Some(Disturbance::Usual);
-        }
-        let outstanding = (slow.iter()).filter(|(_, size)| *size > least.max(ABOVE_NEXT * next));
-        let newest = outstanding.map(|(block, _)| *block).min()?;
-        Some(Disturbance::Over((newest - 1) as f64 * self.days))
-    }
-
     /// The change of velocity over `apart` blocks.
-    fn change(&self, apart: usize, stated: f64, prior: Option<VelocityChange>) -> VelocityChange {
+    fn change(
+        &self,
+        apart: usize,
+        noise: ReadingNoise,
+        prior: Option<VelocityChange>,
+    ) -> VelocityChange {
         let means = &self.means;
         let last = apart + 1;
         let at = |block: usize| {
@@ -461,8 +407,9 @@ impl Blocks {
             count += 1.0;
             largest = largest.max(change);
         }
-        let least = LEAST_CHANGE_MM.max(stated);
+        let least = LEAST_CHANGE_MM.max(noise.change_mm);
         let known = prior.map_or(least, |prior| prior.usual);
+        let known = known.max(noise.of_a_day_mm * self.days.sqrt());
         let square = (squares + PRIOR_COUNT * known * known) / (count + PRIOR_COUNT);
         let carried = prior.map_or(0.0, |prior| prior.freedom - PRIOR_COUNT);
         VelocityChange {
@@ -561,7 +508,7 @@ mod tests {
         };
         let over = |times| {
             let scales = Scales::of(&readings(1.0, 120, jumps(times)));
-            scales.unwrap().disturbed_days
+            scales.unwrap().disturbed.map(|event| event.days)
         };
         assert_eq!(over(&[]), None);
         assert_eq!(over(&[20.0, 40.0, 60.0, 80.0, 100.0]), None);

@@ -28,6 +28,9 @@ enum About {
     Data,
 }
 
+/// A likelihood that is smaller by more than this, ln, is no figure.
+const MOST_NATS: f64 = 50.0;
+
 const REFIT: KindShown = KindShown {
     name: "refit",
     letter: None,
@@ -308,8 +311,13 @@ fn unexplained(what: &Unexplained) -> String {
         } => {
             let velocity = velocity_mm_per_day
                 .map_or_else(String::new, |v| format!(", {} mm/day", figure(v, 3)));
+            let how = if *surprise_nats > MOST_NATS {
+                format!("over e^{MOST_NATS:.0}")
+            } else {
+                format!("e^{surprise_nats:.0}")
+            };
             format!(
-                "unexplained residual: e^{surprise_nats:.0} times less likely than the usual reading{velocity}"
+                "unexplained residual: {how} times less likely than the usual reading{velocity}"
             )
         }
         Unexplained::Structure {

@@ -1,7 +1,8 @@
 //! What the newest rates show by themselves.
 
 use crate::alert::AlertEvidence;
-use crate::fit::{Observation, Observations, Rate, displacement_sigma};
+use crate::fit::{Observations, Rate, displacement_sigma, velocity_sigma};
+use crate::forecast::FEWEST_READINGS;
 use crate::reading::{Quantity, Timestamp};
 
 /// The line goes through this share of the rates, newest last, and no fewer than [`FEWEST_IN_LINE`].
@@ -13,8 +14,9 @@ const SETTLED: usize = 5;
 const LOOKED_AT: usize = 512;
 /// A mean that stands clear of zero does so by so many standard errors.
 const CLEAR: f64 = 4.0;
-/// So many standard errors, by the scatter of the rates, a slope moves backwards where no reading states its error.
-const CLEARLY_BACK: f64 = 5.0;
+/// The error that the first readings may have, mm, and how many times that is taken off their motion.
+const FIRST_ERROR_MM: f64 = 20.0;
+const FIRST_ERRORS: f64 = 6.0;
 /// A settled velocity is a new highest from this factor on.
 const HIGHER: f64 = 1.25;
 
@@ -36,8 +38,6 @@ pub(super) fn moves_backwards(rates: &[Rate]) -> bool {
         && latest
             .iter()
             .all(|rate| rate.velocity < -3.0 * rate.sigma && rate.velocity < 0.0)
-        && (latest.iter().any(|rate| rate.sigma > 0.0)
-            || settled(rates).is_some_and(|now| now < -CLEARLY_BACK * settled_error(rates)))
 }
 
 /// The median of the latest rates, mm/day.
@@ -59,27 +59,8 @@ fn settled_error(rates: &[Rate]) -> f64 {
     let latest = &rates[rates.len().saturating_sub(SETTLED)..];
     let mut errors: Vec<f64> = latest.iter().map(|rate| rate.sigma).collect();
     errors.sort_by(f64::total_cmp);
-    let stated = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
-    let error = if stated > 0.0 {
-        stated
-    } else {
-        scatter_of(rates)
-    };
+    let error = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
     OF_THE_MEDIAN * error / (SETTLED as f64).sqrt()
-}
-
-/// How far velocities whose error nobody states stand from the line between their neighbours, mm/day.
-fn scatter_of(rates: &[Rate]) -> f64 {
-    let as_read = rates.iter().map(|rate| Observation {
-        t_days: rate.middle(),
-        value: rate.velocity,
-        sigma: None,
-    });
-    let as_read: Vec<Observation> = as_read.collect();
-    if as_read.len() <= SETTLED {
-        return 0.0;
-    }
-    displacement_sigma(&as_read)
 }
 
 /// What the slope has moved at least in the mean over the last `days`, mm/day: 0 where that does not stand clear of its error, and in a
@@ -95,18 +76,19 @@ fn moved_at_least(observations: &Observations, days: f64) -> f64 {
     let Some(from) = before.checked_sub(1).filter(|_| is_often) else {
         return 0.0;
     };
-    let scatter = displacement_sigma(&values[values.len().saturating_sub(LOOKED_AT)..]);
+    let looked_at = &values[values.len().saturating_sub(LOOKED_AT)..];
     let (mean, error) = match observations.quantity {
         Quantity::Displacement => {
             let span = newest.t_days - values[from].t_days;
             let moved = newest.value - values[from].value;
-            (moved / span, scatter * std::f64::consts::SQRT_2 / span)
+            let noise = displacement_sigma(looked_at) * std::f64::consts::SQRT_2;
+            (moved / span, noise / span)
         }
         Quantity::Velocity => {
             let own = &values[before..];
             let count = own.len() as f64;
             let sum: f64 = own.iter().map(|one| one.value).sum();
-            (sum / count, scatter / count.sqrt())
+            (sum / count, velocity_sigma(looked_at) / count.sqrt())
         }
     };
     (mean.abs() - CLEAR * error).max(0.0)
@@ -141,7 +123,11 @@ pub(super) fn observed(
     AlertEvidence {
         now,
         velocity_mm_per_day: newest.or_else(|| newest_velocity(observations)),
-        settled_velocity_mm_per_day: settled(rates),
+        settled_velocity_mm_per_day: if are_first(observations) {
+            from_the_first(observations)
+        } else {
+            settled(rates)
+        },
         settled_error_mm_per_day: settled_error(rates),
         // Without rates only thresholds are asked, at each reading.
         moved_at_least_mm_per_day: if rates.is_empty() {
@@ -153,6 +139,38 @@ pub(super) fn observed(
         acceleration_mm_per_day2: acceleration(rates),
         ..AlertEvidence::default()
     }
+}
+
+/// Whether the readings are too few for a forecast.
+pub(super) fn are_first(observations: &Observations) -> bool {
+    observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS
+}
+
+/// The velocity, mm/day, that the first readings, three or more, show beyond doubt where they are too few for a forecast: each step is as fast, and what
+/// is left of the mean of all after an error that no instrument is likely to have. One reading gone wrong makes one step.
+fn from_the_first(observations: &Observations) -> Option<f64> {
+    let values = observations.spaced(FEWEST_READINGS);
+    let [first, _, .., newest] = values.as_slice() else {
+        return None;
+    };
+    let by_each = match observations.quantity {
+        Quantity::Displacement => {
+            let steps = values.windows(2);
+            let each = steps.map(|w| (w[1].value - w[0].value) / (w[1].t_days - w[0].t_days));
+            let least = each.fold(f64::INFINITY, f64::min);
+            let error = displacement_sigma(&values).max(FIRST_ERROR_MM);
+            let moved =
+                newest.value - first.value - FIRST_ERRORS * std::f64::consts::SQRT_2 * error;
+            least.min(moved / (newest.t_days - first.t_days))
+        }
+        Quantity::Velocity => {
+            let each = values
+                .iter()
+                .map(|one| one.value - FIRST_ERRORS * one.sigma.unwrap_or(0.0));
+            each.fold(f64::INFINITY, f64::min)
+        }
+    };
+    (by_each > 0.0).then_some(by_each)
 }
 
 fn acceleration(rates: &[Rate]) -> Option<f64> {
@@ -188,7 +206,7 @@ fn newest_velocity(observations: &Observations) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::RateOptions;
+    use crate::fit::{Observation, RateOptions};
 
     /// Slips of 6 mm each 12 hours, read by the hour: 12 mm/day.
     #[test]
@@ -209,6 +227,22 @@ mod tests {
         assert!(moved_at_least(&at_rest, 1.0).abs() < 1e-9);
     }
 
+    #[test]
+    fn the_third_reading_of_a_slope_that_moves_by_metres_a_day_shows_it_and_noise_does_not() {
+        let shown = |values: &[f64], interval: f64| {
+            let at = |(index, value): (usize, &f64)| (interval * index as f64, *value);
+            from_the_first(&Observations::of_displacements(
+                values.iter().enumerate().map(at),
+            ))
+        };
+        assert_eq!(shown(&[0.0, 2400.0], 1.0), None);
+        assert!(shown(&[0.0, 2400.0, 4900.0], 1.0).unwrap() > 2000.0);
+        // One reading gone wrong, and an hour's noise of a satellite receiver.
+        let one_wrong = shown(&[0.0, 12_000.0, 12_001.0, 12_002.0], 1.0);
+        assert!(one_wrong.is_none_or(|velocity| velocity < 1.5));
+        assert_eq!(shown(&[0.0, 30.0, 60.0, 75.0], 1.0 / 24.0), None);
+    }
+
     /// Velocities of an instrument that states no error.
     #[test]
     fn velocities_that_scatter_about_zero_do_not_move_backwards_and_their_error_shows() {
@@ -219,21 +253,26 @@ mod tests {
                 .wrapping_add(1);
             (state >> 32) as f64 / f64::from(u32::MAX >> 1) - 1.0
         };
-        let rate = |hour: u32, velocity: f64| Rate {
-            from: f64::from(hour) / 24.0,
-            to: f64::from(hour + 1) / 24.0,
-            velocity,
-            sigma: 0.0,
-            readings: 1,
-            error: crate::fit::ReadingError::Own,
+        let mut rates = |from: f64, size: f64| {
+            let values = (0..2000).map(|hour| Observation {
+                t_days: f64::from(hour) / 24.0,
+                value: from + size * random(),
+                sigma: None,
+            });
+            let read = Observations {
+                quantity: Quantity::Velocity,
+                averaging_days: 1.0 / 24.0,
+                values: values.collect(),
+            };
+            read.rates(0..2000, RateOptions { most: 2000 })
         };
-        let rates: Vec<Rate> = (0..2000).map(|hour| rate(hour, 17.0 * random())).collect();
-        for count in 100..rates.len() {
-            assert!(!moves_backwards(&rates[count - 96..count]), "{count}");
+        let noise = rates(0.0, 17.0);
+        for count in 100..noise.len() {
+            assert!(!moves_backwards(&noise[count - 96..count]), "{count}");
         }
-        let error = settled_error(&rates[..96]);
+        let error = settled_error(&noise[..96]);
         assert!(error > 2.0 && error < 15.0, "{error}");
-        let back: Vec<Rate> = (0..96).map(|hour| rate(hour, -20.0 + random())).collect();
+        let back = rates(-20.0, 1.0);
         assert!(moves_backwards(&back));
     }
 }

@@ -12,7 +12,7 @@ use super::mqtt;
 use super::progress::Progress;
 use super::pulse::Reporting;
 use super::sandbox;
-use super::service_faults::ServiceFault;
+use super::service_faults::{ServiceFault, ServiceFaults};
 use super::shutdown::Shutdown;
 use super::site::{Site, announce_ends};
 use super::sources::Sources;
@@ -75,9 +75,13 @@ pub struct Daemon {
 }
 
 /// The way to the hooks of `config`.
-pub(super) fn dispatcher(config: &Config, store: &Arc<Store>) -> Dispatcher {
+pub(super) fn dispatcher(
+    config: &Config,
+    store: &Arc<Store>,
+    faults: &ServiceFaults,
+) -> Dispatcher {
     sandbox::announce(&config.hooks);
-    let delivered = Delivered::of(Arc::clone(store));
+    let delivered = Delivered::of(Arc::clone(store)).reporting(faults);
     Dispatcher::start(&config.hooks, &Retry::default(), delivered)
 }
 

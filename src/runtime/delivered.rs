@@ -2,6 +2,7 @@
 
 use super::clock;
 use super::hook::{Alert, state_name};
+use super::service_faults::{FaultPlace, ServiceFaults};
 use crate::store::{Delivery, DeliveryOutcome, Store, StoreError};
 use jiff::Timestamp;
 use std::collections::BTreeMap;
@@ -22,6 +23,8 @@ pub struct Delivered {
     store: Option<Arc<Store>>,
     /// Whether the last ones could not be made durable, and that has been logged.
     are_unwritten_logged: bool,
+    /// Where hooks that do not take their alerts are reported.
+    faults: ServiceFaults,
 }
 
 /// The alert as the outbox keeps it for a hook.
@@ -48,6 +51,32 @@ impl Delivered {
             store: Some(store),
             ..Self::default()
         }
+    }
+
+    /// The same, and hooks that do not take their alerts stand in `faults`.
+    #[must_use]
+    pub fn reporting(self, faults: &ServiceFaults) -> Self {
+        Self {
+            faults: faults.clone(),
+            ..self
+        }
+    }
+
+    /// `hook` has not taken `alert` in so many attempts; the last of them came to `how`.
+    pub(super) fn fails(&self, hook: &str, alert: &Alert, attempts: u32, how: &str) {
+        let (level, state) = (alert.level.name(), state_name(alert.state));
+        let place = alert.event.benchmark.as_ref();
+        let place = place.map_or("the site".to_owned(), ToString::to_string);
+        let plural = if attempts == 1 { "" } else { "s" };
+        let text = format!(
+            "hook {hook} has not taken {level} ({state}) of {place} in {attempts} attempt{plural}: {how}"
+        );
+        self.faults.lasts(FaultPlace::of_hook(hook), &text);
+    }
+
+    /// `hook` takes what it gets, or is no hook any more.
+    pub(super) fn fails_no_more(&self, hook: &str) {
+        self.faults.is_over(&FaultPlace::of_hook(hook));
     }
 
     /// Whether nothing more is to be tried with this alert at `hook`: it has taken it, somebody acknowledged or silenced it

@@ -241,10 +241,14 @@ impl Alert {
         matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == CLOCK_FAULT)
     }
 
-    fn variables(&self, attempt: u32, link: Option<&str>) -> [(&'static str, String); 12] {
+    fn variables(&self, attempt: u32, link: Option<&str>) -> [(&'static str, String); 14] {
         let benchmark = self.event.benchmark.as_ref();
         let count = self.many.as_ref().map_or(1, |many| many.members.len());
         let optional_time = self.failure_time.map(|time| time.to_string());
+        let (rule, text) = match &self.event.kind {
+            EventKind::Alert { rule, text, .. } => (rule.to_string(), one_line(text)),
+            _ => (String::new(), String::new()),
+        };
         [
             ("SLIPWATCH_EVENT", self.event.kind.name().to_owned()),
             ("SLIPWATCH_KEY", self.key.clone()),
@@ -256,6 +260,8 @@ impl Alert {
             ("SLIPWATCH_COUNT", count.to_string()),
             ("SLIPWATCH_LEVEL", self.level.name().to_owned()),
             ("SLIPWATCH_STATE", state_name(self.state).to_owned()),
+            ("SLIPWATCH_RULE", rule),
+            ("SLIPWATCH_TEXT", text),
             ("SLIPWATCH_TIME", self.event.time.to_string()),
             ("SLIPWATCH_FAILURE_TIME", optional_time.unwrap_or_default()),
             ("SLIPWATCH_ATTEMPT", attempt.to_string()),
@@ -294,6 +300,12 @@ impl Alert {
     }
 }
 
+/// Without what ends a line or a C string.
+fn one_line(text: &str) -> String {
+    let plain = |letter: char| if letter.is_control() { ' ' } else { letter };
+    text.chars().map(plain).collect()
+}
+
 /// The word in `SLIPWATCH_STATE`.
 pub(crate) fn state_name(state: MessageState) -> &'static str {
     match state {
@@ -318,6 +330,20 @@ pub enum HookOutcome {
     Refused(u16),
     /// It could not be run, or sent, at all.
     NotStarted(String),
+}
+
+impl HookOutcome {
+    /// For a person.
+    pub fn in_words(&self) -> String {
+        match self {
+            Self::Done => "done".to_owned(),
+            Self::Failed(code) => format!("ended with exit code {code}"),
+            Self::Signalled(signal) => format!("ended by signal {signal}"),
+            Self::TimedOut => "killed when its time was up".to_owned(),
+            Self::Refused(status) => format!("answered with status {status}"),
+            Self::NotStarted(why) => format!("not started: {why}"),
+        }
+    }
 }
 
 /// Runs the program of `hook` for `alert`; `attempt` counts from 1.

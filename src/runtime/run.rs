@@ -75,7 +75,7 @@ pub async fn run(
     let mut pulse = Reporting::start(&config.site, vitals, behind).await?;
     let sinks = Sinks {
         store: Some(Arc::clone(&store)),
-        alerts: Some(dispatcher(config, &store)),
+        alerts: Some(dispatcher(config, &store, pulse.vitals.faults())),
         status: Status::Actual,
     };
     let name = &config.site.name;

@@ -38,17 +38,20 @@ pub enum ServiceFaultKind {
     FileUnreadable,
     /// Make anything of a file, until it is replaced.
     FileRefused,
+    /// Have an alert taken by a hook.
+    HookFailing,
 }
 
 impl ServiceFaultKind {
     /// Each of them.
-    pub(super) const ALL: [Self; 6] = [
+    pub(super) const ALL: [Self; 7] = [
         Self::StateUnwritable,
         Self::BrokerUnreachable,
         Self::SubscriptionRefused,
         Self::FolderUnreadable,
         Self::FileUnreadable,
         Self::FileRefused,
+        Self::HookFailing,
     ];
 
     /// As in messages.
@@ -60,13 +63,17 @@ impl ServiceFaultKind {
             Self::FolderUnreadable => "folder-unreadable",
             Self::FileUnreadable => "file-unreadable",
             Self::FileRefused => "file-refused",
+            Self::HookFailing => "hook-failing",
         }
     }
 
     /// Whether it is of a file, or a folder of them.
     fn is_of_files(self) -> bool {
         match self {
-            Self::StateUnwritable | Self::BrokerUnreachable | Self::SubscriptionRefused => false,
+            Self::StateUnwritable
+            | Self::BrokerUnreachable
+            | Self::SubscriptionRefused
+            | Self::HookFailing => false,
             Self::FolderUnreadable | Self::FileUnreadable | Self::FileRefused => true,
         }
     }
@@ -100,6 +107,15 @@ impl FaultPlace {
             kind,
             source: Some(source.to_owned()),
             what: String::new(),
+        }
+    }
+
+    /// Of a hook.
+    pub(super) fn of_hook(name: &str) -> Self {
+        Self {
+            kind: ServiceFaultKind::HookFailing,
+            source: None,
+            what: name.to_owned(),
         }
     }
 
@@ -149,7 +165,7 @@ impl ServiceFaults {
     }
 
     /// The first of them.
-    pub(super) fn shown(&self) -> Vec<ServiceFault> {
+    pub fn shown(&self) -> Vec<ServiceFault> {
         let faults = self.locked();
         let shown = faults.iter().take(MOST_SHOWN);
         shown

@@ -15,6 +15,7 @@ use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::deliver::{self, Dispatcher, Retry};
 use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::{Alert, HookOutcome, Status};
+use slipwatch::runtime::service_faults::ServiceFaults;
 use slipwatch::store::{AlertIdentity, DeliveryOutcome, Store};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -219,6 +220,30 @@ async fn a_hook_that_fails_is_tried_again_with_the_same_key() {
         read(&folder, "calls"),
         "1 toc/5/red/1\n2 toc/5/red/1\n3 toc/5/red/1\n"
     );
+}
+
+#[tokio::test]
+async fn a_hook_that_fails_is_shown_with_what_it_did_until_it_takes_an_alert() {
+    let (folder, config) =
+        hook("echo \"$SLIPWATCH_RULE: $SLIPWATCH_TEXT\" > said; [ -e works ] || exit 7");
+    let faults = ServiceFaults::default();
+    let delivered = Delivered::default().reporting(&faults);
+    let retry = Retry {
+        longest_delay: Duration::from_millis(20),
+        ..quick_retry()
+    };
+    let dispatcher = Dispatcher::start(&[config], &retry, delivered);
+    dispatcher.offer(&alert_of(Level::Red, "5/red/1", "chance 0.3"));
+    eventually("the fault", || !faults.shown().is_empty()).await;
+    let text = faults.shown().remove(0).text;
+    assert!(
+        text.contains("red (firing)") && text.contains("exit code 7"),
+        "{text}"
+    );
+    std::fs::write(folder.path().join("works"), "").unwrap();
+    eventually("the end of the fault", || faults.shown().is_empty()).await;
+    assert_eq!(dispatcher.close(LIMIT).await, Some(0));
+    assert!(read(&folder, "said").contains("chance 0.3"));
 }
 
 /// The end of an alert goes to those who were notified of its beginning.

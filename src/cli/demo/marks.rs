@@ -51,7 +51,12 @@ impl MarkScale {
 
     /// The lowest and the highest value.
     pub(super) fn ends(&self) -> String {
-        let shown = |value: f64| figure(value, usize::from(value < 10.0));
+        let decimals = |value: f64| match value {
+            _ if value < 0.1 => 3,
+            _ if value < 10.0 => 1,
+            _ => 0,
+        };
+        let shown = |value: f64| figure(value, decimals(value));
         self.span.map_or_else(
             || "none".to_owned(),
             |(low, high)| format!("{}-{}", shown(low), shown(high)),

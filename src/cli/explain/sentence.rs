@@ -71,7 +71,13 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
             }
             Explained::None => format!("Not explained: structure is left in the residual{left}."),
         });
-        if explanation.verdict.effect.is_of_the_reading() {
+        if explanation.verdict.effect == Kind::CORRELATED_NOISE {
+            // What remembers may be the instrument, and may be motion that no effect that was tried makes.
+            said.push(
+                "Whether the instrument makes it or the slope, these readings do not show."
+                    .to_owned(),
+            );
+        } else if explanation.verdict.effect.is_of_the_reading() {
             said.push("It lies in the measurement, not in the slope.".to_owned());
         }
     }

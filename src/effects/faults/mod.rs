@@ -1,6 +1,6 @@
 //! What is wrong with the data themselves: found, named and taken out before any effect is looked for.
 //!
-//! In this order, since each needs what the ones before it have cleaned: codes and impossible values,
+//! In this order, since each needs what the ones before it have cleaned: codes and impossible values, changes of the unit,
 //! copied rows, stuck values, outliers, resets of covariates; and last whether what is left is any
 //! instrument's. A jump of the benchmark's own reading is left in it: that is an effect (`offset`).
 
@@ -14,6 +14,7 @@ mod smooth;
 mod stuck;
 mod trace;
 mod twin;
+mod unit_slip;
 
 use super::explanation::Fault;
 use super::kind::FaultKind;
@@ -56,6 +57,7 @@ pub fn inspect(series: &Series, channels: &[Channel]) -> Inspected {
         twins: Vec::new(),
     };
     bench.take_out_codes();
+    bench.take_out_unit_slips();
     bench.take_out_copies();
     bench.take_out_stuck();
     bench.take_out_outliers();
@@ -150,6 +152,21 @@ impl FaultBench {
             let trace = self.trace(source);
             let wrong = codes::out_of_range(&trace, nature);
             self.take_out_marked(FaultKind::OutOfRange, source, &trace, &wrong);
+        }
+    }
+
+    /// Names each change of the readings' unit, and gives what follows in the unit before it.
+    fn take_out_unit_slips(&mut self) {
+        let trace = self.trace(Source::Benchmark);
+        for slip in unit_slip::unit_slips(&trace) {
+            let rows = slip.from..trace.len();
+            let mut fault = self.fault(FaultKind::UnitSlip, Source::Benchmark, &trace, &rows);
+            (fault.size, fault.unit) = (Some(slip.times), None);
+            self.faults.push(fault);
+            for reading in &mut self.series.readings[rows] {
+                reading.value /= slip.times;
+                reading.sigma = reading.sigma.map(|sigma| sigma / slip.times);
+            }
         }
     }
 

@@ -23,6 +23,7 @@ pub(super) fn flags(faults: &[Fault]) -> Vec<String> {
         | FaultKind::Stuck
         | FaultKind::Interpolated
         | FaultKind::Outlier
+        | FaultKind::UnitSlip
         | FaultKind::OutOfRange => kind.name().to_owned(),
     };
     kinds.iter().map(flag).collect()
@@ -80,6 +81,9 @@ fn sentence(
         FaultKind::Stuck => format!(
             "{source}: stuck ({listed}); all but the first value of each run are taken out."
         ),
+        FaultKind::UnitSlip => format!(
+            "{source}: from a time on all values are so many times as large ({listed}), as in another unit; they are taken in the unit before."
+        ),
         FaultKind::Outlier => {
             let what = counted(values, "value far", "values far");
             format!("{source}: {what} from all around, and back again ({listed}), taken out.")
@@ -125,6 +129,9 @@ fn instance(fault: &Fault) -> String {
             size.to_string()
         }
     });
+    if fault.kind == FaultKind::UnitSlip {
+        return format!("× {size} from {date} on");
+    }
     let unit = fault.unit.as_deref().unwrap_or("");
     let until = fault
         .until

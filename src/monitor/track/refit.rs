@@ -10,6 +10,7 @@ use crate::monitor::event::{
     ChancesOfCollapse, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport,
     Unexplained,
 };
+use crate::monitor::motion::settled;
 use crate::monitor::recent;
 use crate::reading::{Timestamp, after_days};
 use crate::regime::{Regime, Tracker, label};
@@ -81,7 +82,9 @@ impl FitChanges {
             let expected = outlook
                 .law
                 .and_then(|law| drift::expected_by_the_law(&law, recent(&outlook.rates), now));
-            if moved.to_days < moved.from_days {
+            // A slope that moves backwards has no inverse velocity that meets zero.
+            let is_forward = settled(&outlook.rates).is_none_or(|velocity| velocity > 0.0);
+            if moved.to_days < moved.from_days && is_forward {
                 causes.push(AlertCause::InterceptDriftingIn);
             }
             let kind = |from, to| EventKind::InterceptDrift {

@@ -131,7 +131,8 @@ impl Daemon {
         self.commit()?;
         if !self.keeps_hooks(&fresh) {
             self.close_hooks().await;
-            self.site.rehook(dispatcher(&fresh, &self.store))?;
+            self.site
+                .rehook(dispatcher(&fresh, &self.store, self.pulse.vitals.faults()))?;
         }
         self.note_closed()?;
         self.note_inherited(&fresh)?;

@@ -130,6 +130,7 @@ impl Worker {
             }
             while self.running.len() < MOST_AT_ONCE && self.start_next(open) {}
             if !open && self.running.is_empty() {
+                locked(&self.delivered).fails_no_more(&self.hook.name());
                 return self.lost;
             }
             let due = self.next_due();
@@ -244,6 +245,7 @@ impl Worker {
         let (hook, key) = (self.hook.name(), waiting.alert.key.clone());
         let attempt = waiting.attempt;
         let goes_on = waiting.alert.must_arrive() || attempt < self.retry.attempts;
+        self.report(waiting, outcome);
         if outcome == Some(&HookOutcome::Done) {
             self.finish(&waiting.alert, DeliveryOutcome::Delivered);
         } else if self.is_over(&waiting.alert) {
@@ -279,6 +281,19 @@ impl Worker {
                 DeliveryOutcome::Waiting
             };
             self.finish(&waiting.alert, fate);
+        }
+    }
+
+    /// A hook that fails is shown as such until it takes an alert.
+    fn report(&self, waiting: &Waiting, outcome: Option<&HookOutcome>) {
+        let hook = self.hook.name();
+        let delivered = locked(&self.delivered);
+        match outcome {
+            Some(HookOutcome::Done) => delivered.fails_no_more(&hook),
+            Some(failed) => {
+                delivered.fails(&hook, &waiting.alert, waiting.attempt, &failed.in_words());
+            }
+            None => {}
         }
     }
 

@@ -105,7 +105,7 @@ fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
 
 /// What lasts and keeps the daemon from its work.
 fn faults(sheet: &mut Sheet<'_>, faults: &ServiceFaults) -> fmt::Result {
-    let about = "What lasts and keeps the daemon from its work: brokers out of reach, files that cannot be read, the state";
+    let about = "What lasts and keeps the daemon from its work: brokers out of reach, files that cannot be read, hooks that fail, the state";
     let mut family = (sheet.0).encode_descriptor("faults", about, None, MetricType::Gauge)?;
     let mut counts = faults.counts();
     for kind in ServiceFaultKind::ALL {

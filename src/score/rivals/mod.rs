@@ -16,6 +16,7 @@ pub(super) mod voight;
 use super::Known;
 use crate::fit::{Rate, RateOptions};
 use crate::forecast::{LawForecaster, Passage, by_the_law};
+use crate::reading::Quantity;
 
 /// What the monitor goes by.
 pub(super) fn panel(known: &Known) -> Option<Passage> {
@@ -44,7 +45,15 @@ fn point(days: f64) -> Option<Passage> {
 /// The velocities in the record, oldest first.
 fn rates(known: &Known) -> Vec<Rate> {
     let observations = &known.observations;
-    observations.rates(0..observations.values.len(), RateOptions::default())
+    let mut rates = observations.rates(0..observations.values.len(), RateOptions::default());
+    let is_velocity = observations.quantity == Quantity::Velocity;
+    if is_velocity && observations.values.iter().all(|one| one.sigma.is_none()) {
+        // The methods as published take velocities as they are read.
+        for rate in &mut rates {
+            rate.sigma = 0.0;
+        }
+    }
+    rates
 }
 
 /// Whether a velocity is forward and stands clear of its noise: the others have no logarithm or inverse that

@@ -6,7 +6,7 @@ use crate::alert::{
 };
 use crate::forecast::HORIZON_DAYS;
 use crate::monitor::event::{AlertState, CalledLevel, Event, EventKind, LevelChance};
-use crate::monitor::motion::{moves_backwards, settled};
+use crate::monitor::motion::{are_first, moves_backwards, settled};
 use crate::monitor::track::days;
 use crate::monitor::track::forecast::{EARLY, Forecast, LookAhead};
 use crate::monitor::track::record::BenchmarkRecord;
@@ -121,18 +121,19 @@ impl Alarm {
         is_more.then(|| self.raise(beside, policy, time)).flatten()
     }
 
-    /// Between two refits: plain thresholds and the site's own rules act at every reading. They may raise the level; it
-    /// falls only where there is a forecast too.
+    /// Between two refits: plain thresholds and the site's own rules act at every reading, and the critical velocity before there is a
+    /// forecast. They may raise the level; it falls only where there is a forecast too.
     pub(in crate::monitor::track) fn raise(
         &mut self,
         beside: BesideForecast<'_>,
         policy: &Policy,
         time: Timestamp,
     ) -> Option<Event> {
-        if policy.thresholds.is_empty() && policy.rules.is_empty() {
+        let record = beside.record;
+        let is_asked = !policy.thresholds.is_empty() || !policy.rules.is_empty();
+        if !is_asked && !are_first(record.observations()) {
             return None;
         }
-        let record = beside.record;
         // The rates are those of the whole record: only where they can matter.
         let needs_rates = policy.needs_rates();
         let mut evidence = if needs_rates {

@@ -1,0 +1,110 @@
+//! Columns that only say when a reading was made: no covariates.
+
+use crate::reading::{Channel, Timestamp, days_since};
+use jiff::civil::DateTime;
+use jiff::tz::{Offset, TimeZone};
+
+/// Fewest values that show it.
+const FEWEST: usize = 12;
+/// So many values are looked at.
+const MOST: usize = 400;
+/// Of the values so many are what the clock has.
+const AGREEING: f64 = 0.98;
+/// What a straight line in time leaves of the variance of a count of days.
+const STRAIGHT: f64 = 1e-9;
+/// The widest offsets of zones, hours.
+const OFFSETS: std::ops::RangeInclusive<i8> = -12..=14;
+
+/// Whether the values of a channel are a part of its times, or count them.
+pub(super) fn is_of_the_calendar(channel: &Channel) -> bool {
+    let samples = &channel.samples;
+    if samples.len() < FEWEST {
+        return false;
+    }
+    let every = samples.len().div_ceil(MOST);
+    let values: Vec<(Timestamp, f64)> = samples
+        .iter()
+        .step_by(every)
+        .map(|one| (one.time, one.value))
+        .collect();
+    let is_constant = values.windows(2).all(|w| w[0].1.total_cmp(&w[1].1).is_eq());
+    !is_constant && (counts(channel) || is_straight(&values) || is_a_part(&values))
+}
+
+/// Whether each value is one more than the one before it.
+fn counts(channel: &Channel) -> bool {
+    let mut pairs = channel.samples.windows(2);
+    pairs.all(|pair| (pair[1].value - pair[0].value - 1.0).abs() < 1e-9)
+}
+
+/// Whether the values lie on a straight line in time.
+fn is_straight(values: &[(Timestamp, f64)]) -> bool {
+    let n = values.len() as f64;
+    let days: Vec<f64> = values
+        .iter()
+        .map(|one| days_since(values[0].0, one.0))
+        .collect();
+    let t = days.iter().sum::<f64>() / n;
+    let y = values.iter().map(|one| one.1).sum::<f64>() / n;
+    let (mut tt, mut ty, mut yy) = (0.0, 0.0, 0.0);
+    for (day, (_, value)) in days.iter().zip(values) {
+        tt += (day - t).powi(2);
+        ty += (day - t) * (value - y);
+        yy += (value - y).powi(2);
+    }
+    tt > 0.0 && yy - ty * ty / tt <= STRAIGHT * yy
+}
+
+/// Whether they are the year, the month, the day of the month or of the year, the hour or the minute of one time zone.
+fn is_a_part(values: &[(Timestamp, f64)]) -> bool {
+    let parts: [fn(DateTime) -> i16; 6] = [
+        DateTime::year,
+        |at| i16::from(at.month()),
+        |at| i16::from(at.day()),
+        DateTime::day_of_year,
+        |at| i16::from(at.hour()),
+        |at| i16::from(at.minute()),
+    ];
+    if values.iter().any(|one| one.1.fract() != 0.0) {
+        return false;
+    }
+    OFFSETS.into_iter().any(|hours| {
+        let zone = TimeZone::fixed(Offset::constant(hours));
+        let civil: Vec<DateTime> = values.iter().map(|one| zone.to_datetime(one.0)).collect();
+        parts.iter().any(|part| {
+            let agree = civil.iter().zip(values);
+            let agree =
+                agree.filter(|(at, (_, value))| f64::from(part(**at)).total_cmp(value).is_eq());
+            agree.count() as f64 >= AGREEING * values.len() as f64
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{channel, daily};
+    use super::is_of_the_calendar;
+
+    #[test]
+    fn a_date_is_no_covariate_and_a_level_and_whole_degrees_are() {
+        let days = daily(200);
+        let of = |value: fn(usize) -> f64| {
+            let values: Vec<f64> = (0..days.len()).map(value).collect();
+            is_of_the_calendar(&channel("one", &days, &values))
+        };
+        assert!(of(|row| row as f64));
+        assert!(of(|row| 2011.0 + row as f64 / 365.25));
+        assert!(!of(|_| 4.0));
+        assert!(!of(|row| (row % 24) as f64));
+        assert!(!of(|row| 300.0 + (row as f64 / 20.0).sin()));
+        let made = channel("one", &days, &vec![0.0; days.len()]);
+        let mut month = made.clone();
+        for sample in &mut month.samples {
+            let at = sample
+                .time
+                .to_zoned(jiff::tz::TimeZone::fixed(jiff::tz::offset(9)));
+            sample.value = f64::from(at.day());
+        }
+        assert!(is_of_the_calendar(&month));
+    }
+}

@@ -1,0 +1,106 @@
+//! Events in a record after which the slope slowed down by far more than it usually does: a slide that stopped, a reset, a few wrong
+//! readings.
+
+/// A change is never known better than this, mm.
+pub(super) const LEAST_CHANGE_MM: f64 = 1e-4;
+/// Fewest changes among which one may stand out, how many standard deviations it does, taken from the median size, and the most
+/// events that are not usual yet.
+const FEWEST_CHANGES: usize = 32;
+const OUTSTANDING: f64 = 10.0;
+const NORMAL_MEDIAN: f64 = 0.6745;
+const MOST_EVENTS: usize = 2;
+/// What lies within so many blocks, or this share of the record, is one event; and an event stands out that is so many times the
+/// largest that is usual.
+const ONE_EVENT: usize = 6;
+const EVENTS: usize = 12;
+const ABOVE_NEXT: f64 = 4.0;
+
+/// An event after which the slope slowed down by far more than it usually does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PastEvent {
+    /// How long ago it was over, days.
+    pub days: f64,
+    /// How surely it stands out of all else, above 0 and at most 1: blocks move along with the newest reading, and a limit would be
+    /// passed back and forth.
+    pub share: f64,
+}
+
+impl PastEvent {
+    /// The newest of those that stand out nearly as surely as the one that does most, where a share `usual` of all events is what often
+    /// happens on the slope.
+    pub(super) fn newest(found: &[Self], usual: f64) -> Option<Self> {
+        let most = found.iter().map(|event| event.share).fold(0.0, f64::max);
+        let sure = found.iter().filter(|event| event.share >= 0.5 * most);
+        let days = sure.map(|event| event.days).reduce(f64::min)?;
+        let share = most * (1.0 - usual);
+        (share > 0.0).then_some(Self { days, share })
+    }
+}
+
+/// How much of a limit is passed: 0 at half of it, 1 at the whole.
+fn nearly(ratio: f64) -> f64 {
+    (1.0 + ratio.log2()).clamp(0.0, 1.0)
+}
+
+/// The largest of these (block, slow-down), largest first, each further than `apart` blocks from the larger ones.
+fn largest_events(slow: &[(usize, f64)], apart: usize) -> [f64; MOST_EVENTS + 1] {
+    let mut largest = [0.0; MOST_EVENTS + 1];
+    let mut places: Vec<usize> = Vec::new();
+    for event in &mut largest {
+        let others = slow
+            .iter()
+            .filter(|(block, _)| places.iter().all(|place| block.abs_diff(*place) > apart));
+        if let Some((block, size)) = others.max_by(|a, b| a.1.total_cmp(&b.1)) {
+            places.push(*block);
+            *event = *size;
+        }
+    }
+    largest
+}
+
+/// The upper one of the two middle ones of an even number; `values` are not empty.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The newest of one or two events after which the slope slowed down by far more than ever else: a slide that stopped, a reset, a
+/// few readings that were wrong; and how surely more of them stand out, so that they are usual there. `None` with too few blocks.
+pub(super) fn past_events(
+    means: &[f64],
+    is_read: &[bool],
+    days: f64,
+) -> Option<(Option<PastEvent>, f64)> {
+    let count = means.len().checked_sub(2)?;
+    if count < FEWEST_CHANGES {
+        return None;
+    }
+    let at = |block: usize| {
+        let [a, b, c] = [0, 1, 2].map(|next| means[block + next]);
+        (a - b) - (b - c)
+    };
+    let read = (1..count).filter(|block| is_read[*block..block + 3].iter().all(|is| *is));
+    let changes: Vec<(usize, f64)> = read.map(|block| (block, at(block))).collect();
+    let mut sizes: Vec<f64> = changes.iter().map(|(_, change)| change.abs()).collect();
+    if sizes.len() < FEWEST_CHANGES {
+        return None;
+    }
+    let median = median(&mut sizes);
+    if median < LEAST_CHANGE_MM {
+        return None;
+    }
+    let slow: Vec<(usize, f64)> = (changes.iter())
+        .filter(|(_, change)| *change < 0.0)
+        .map(|(block, change)| (*block, -change))
+        .collect();
+    let largest = largest_events(&slow, ONE_EVENT.max(count / EVENTS));
+    let least = OUTSTANDING * median / NORMAL_MEDIAN;
+    let next = largest[MOST_EVENTS];
+    let share = |size: f64| nearly(size / least.max(ABOVE_NEXT * next));
+    let events = slow.iter().map(|(block, size)| PastEvent {
+        days: (*block - 1) as f64 * days,
+        share: share(*size),
+    });
+    let events: Vec<PastEvent> = events.filter(|event| event.share > 0.0).collect();
+    Some((PastEvent::newest(&events, 0.0), nearly(0.5 * next / least)))
+}
