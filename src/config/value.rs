@@ -34,9 +34,39 @@ pub(crate) fn instant(text: &str) -> Result<Timestamp, String> {
     })
 }
 
-/// A time zone by its IANA name: `Europe/Rome`.
+/// A time zone by its IANA name, `Europe/Rome`, or by an offset of whole hours that never changes, `+01:00` or `UTC+1`.
 pub(crate) fn time_zone(text: &str) -> Result<TimeZone, String> {
-    TimeZone::get(text).map_err(|_| "write an IANA name, such as \"Europe/Rome\"".to_owned())
+    let by_name = TimeZone::get(text);
+    by_name.or_else(|_| {
+        let zone = fixed_zone(text).and_then(|name| TimeZone::get(&name).ok());
+        zone.ok_or_else(|| {
+            "write an IANA name, such as \"Europe/Rome\", or an offset of whole hours, such as \"+01:00\", which is Etc/GMT-1"
+                .to_owned()
+        })
+    })
+}
+
+/// The IANA name of an offset of whole hours, whose sign is the other way round: `Etc/GMT-1` of `+01:00`.
+fn fixed_zone(text: &str) -> Option<String> {
+    let plain = text.trim().to_ascii_uppercase();
+    let bare = plain.strip_prefix("UTC").or(plain.strip_prefix("GMT"));
+    let offset = bare.unwrap_or(&plain).trim();
+    let (sign, rest) = match (offset.strip_prefix('+'), offset.strip_prefix('-')) {
+        (Some(rest), _) => ('-', rest),
+        (None, Some(rest)) => ('+', rest),
+        (None, None) => return None,
+    };
+    let rest = rest
+        .strip_suffix(":00")
+        .or(rest.strip_suffix("00").filter(|rest| rest.len() == 2));
+    let hours = rest.unwrap_or(offset.get(1..)?);
+    if !(1..=2).contains(&hours.len()) || !hours.bytes().all(|digit| digit.is_ascii_digit()) {
+        return None;
+    }
+    match hours.parse::<u8>().ok()? {
+        0 => Some("UTC".to_owned()),
+        hours => Some(format!("Etc/GMT{sign}{hours}")),
+    }
 }
 
 /// A speed in mm/day: `1 m/day`, `50 mm/day`.

@@ -3,6 +3,7 @@
 use super::bytes::read_bytes;
 use super::csv::stands_before_header;
 use super::encoding::{Transcoder, latin1};
+use super::names::unit_in_name;
 use super::split::Splitter;
 use super::{IngestError, Remark};
 use crate::reading::{Delimiter, Dialect};
@@ -47,6 +48,15 @@ pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
                 Cow::Owned(latin1(line).unwrap_or_default())
             })
         });
+    if bytes.contains(&b'\r') && !bytes.contains(&b'\n') {
+        return Err(IngestError::Header {
+            file: file.into(),
+            line: 1,
+            column: "(any)".to_owned(),
+            problem: "its lines end in carriage returns alone",
+            expected: "line feeds: tr '\\r' '\\n' writes them",
+        });
+    }
     let empty = |missing| IngestError::Empty {
         file: file.into(),
         missing,
@@ -65,6 +75,17 @@ pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
         found,
     })?;
     let mut names: Vec<String> = cells.iter().map(str::to_owned).collect();
+    if let ([only], None) = (&names[..], dialect.delimiter)
+        && let Some(problem) = other_delimiter(only)
+    {
+        return Err(IngestError::Header {
+            file: file.into(),
+            line,
+            column: names.swap_remove(0),
+            problem,
+            expected: "commas, semicolons or tabs between the cells: let the logger write one of them, or replace what stands there",
+        });
+    }
     if names.is_empty() {
         return Err(empty("header"));
     }
@@ -104,4 +125,48 @@ pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
         columns,
         encoding,
     })
+}
+
+/// What parts the names of a header that has no comma, semicolon or tab.
+fn other_delimiter(header: &str) -> Option<&'static str> {
+    let words = header.split_whitespace();
+    let are_named = |word: &str| {
+        word.eq_ignore_ascii_case("time") || unit_in_name(word).is_some() || word == "t_days"
+    };
+    if header.contains('|') {
+        Some("its cells are parted by |")
+    } else if words.clone().count() > 1 && words.clone().any(are_named) {
+        Some("its cells are parted by blanks")
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_parts_cells_and_lines_is_named_where_it_cannot_be_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.csv");
+        for (text, named) in [
+            (
+                "time|P1_displacement_mm\n2026-11-28T19:00:00Z|1\n",
+                "parted by |",
+            ),
+            (
+                "time P1_displacement_mm\n2026-11-28T19:00:00Z 1\n",
+                "parted by blanks",
+            ),
+            (
+                "time,P1_displacement_mm\r2026-11-28T19:00:00Z,1\r",
+                "carriage returns",
+            ),
+        ] {
+            std::fs::write(&file, text).unwrap();
+            let said = survey(&file, &Dialect::default()).unwrap_err().to_string();
+            assert!(said.contains(named), "{said}");
+        }
+    }
 }

@@ -118,6 +118,9 @@ pub struct BenchmarkPreview {
     pub first: (Timestamp, f64),
     /// The latest, its time and value.
     pub last: (Timestamp, f64),
+    /// By how many mm a displacement has changed since the first, less what it jumped by at declared resets.
+    #[serde(skip)]
+    pub moved_mm: Option<f64>,
     /// The median time between the latest, s.
     pub every_s: Option<i64>,
     /// What in them hardly means what was intended, with its evidence.
@@ -147,6 +150,7 @@ impl BenchmarkPreview {
             out_of_range: 0,
             first,
             last: first,
+            moved_mm: None,
             every_s: None,
             suspicions: Vec::new(),
             remarks: Vec::new(),
