@@ -164,6 +164,29 @@ mod tests {
     use super::*;
 
     #[test]
+    fn an_offset_of_whole_hours_is_a_time_zone() {
+        for (text, name) in [
+            ("Europe/Rome", "Europe/Rome"),
+            ("+01:00", "Etc/GMT-1"),
+            ("UTC+1", "Etc/GMT-1"),
+            ("GMT-03:00", "Etc/GMT+3"),
+            ("+0800", "Etc/GMT-8"),
+            ("utc+00:00", "UTC"),
+            ("Etc/GMT+3", "Etc/GMT+3"),
+        ] {
+            let zone = time_zone(text);
+            let found = zone.as_ref().map(|zone| zone.iana_name());
+            assert_eq!(found, Ok(Some(name)), "{text}");
+        }
+        for text in ["+05:30", "+1:0", "Roma", "+99", "+"] {
+            assert!(
+                time_zone(text).is_err_and(|why| why.contains("Etc/GMT-1")),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
     fn a_value_with_a_unit_comes_out_in_millimetres_and_days() {
         assert_eq!(speed("1 m/day"), Ok(1000.0));
         assert!((speed("2mm/h").unwrap() - 48.0).abs() < 1e-9);

@@ -280,8 +280,8 @@ fn init_says_of_a_file_without_readings_what_it_has_and_suggests_no_wrong_unit()
             "--column \"d_dm=P1:displacement:UNIT\"; a UNIT is um, mm, cm",
         ),
         (
-            format!("time,rate_mm_per_s\n{row},4\n"),
-            "--column \"rate_mm_per_s=P1:velocity:UNIT\"",
+            format!("time,rate [mm/s]\n{row},4\n"),
+            "--column \"rate [mm/s]=P1:velocity:UNIT\"",
         ),
         (
             format!("time,way_cm\n{row},4\n"),

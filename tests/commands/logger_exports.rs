@@ -200,10 +200,11 @@ fn columns_named_as_readings_in_a_unit_that_is_not_known_are_remarked() {
         "D_displacement_km",
         "E_velocity_mm_s",
         "F_displacement_dm",
+        "G displacement [\u{b5}m]",
     ];
     let header = format!("time,P1_displacement_mm,{}", names.join(","));
     let (_, said) = begun(&header, |time, value| {
-        format!("{time}+00:00,{value},1,2,3,{value}\n")
+        format!("{time}+00:00,{value},1,2,3,{value},5\n")
     });
     for name in names {
         let remark = format!("column {name:?}: named like a reading");

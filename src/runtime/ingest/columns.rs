@@ -104,7 +104,10 @@ fn like_a_reading(name: &str) -> Option<Remark> {
         .into_iter()
         .find_map(|keyword| {
             let (_, rest) = plain.rsplit_once(keyword)?;
-            let unit = rest.strip_prefix('_').or_else(|| in_brackets(rest));
+            let unit = rest
+                .strip_prefix(['_', ' '])
+                .filter(|unit| !unit.starts_with(['[', '(']));
+            let unit = unit.or_else(|| in_brackets(rest));
             let is_one = rest.is_empty()
                 || unit.is_some_and(is_unit_of_motion)
                 || channel_unit(name).is_none();

@@ -83,10 +83,9 @@ const WORDS_OF_UNITS: [&str; 24] = [
 
 /// Whether a text is a unit of length or of velocity, whether it can be read or not: `m_per_s`, `km`.
 pub(super) fn is_unit_of_motion(text: &str) -> bool {
-    !text.is_empty()
-        && text
-            .split(['_', '/'])
-            .all(|word| WORDS_OF_UNITS.contains(&word))
+    let mut words = text.split(['_', '/']);
+    Unit::parse(text).is_ok()
+        || !text.is_empty() && words.all(|word| WORDS_OF_UNITS.contains(&word))
 }
 
 /// `velocity_kmh` is a reading in a unit that is not known; `displacement_sensor_voltage_v` is a

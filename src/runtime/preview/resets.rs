@@ -2,7 +2,7 @@
 
 use crate::monitor::{Declaration, Declared};
 use crate::reading::suspicion::scatter_of;
-use crate::reading::{BenchmarkId, Timestamp, Unit, figure};
+use crate::reading::{BenchmarkId, Timestamp, Unit, whole_figure};
 
 /// What is declared to be a jump and what the readings show differ by more than so many times the scatter of their steps,
 const SCATTERS: f64 = 10.0;
@@ -56,7 +56,7 @@ impl DeclaredResets {
                 doubts.push(format!(
                     "the reset declared for {time} has a size of {} {unit}, and the readings go from {before} to {here} {unit} there: \
                      are its sign and its unit right? Its size is what the readings jump by",
-                    figure(jump, 4)
+                    whole_figure(jump)
                 ));
             }
             for (_, value) in &mut moved[after..] {
