@@ -365,13 +365,7 @@ fn a_unit_that_changes_with_a_header_is_converted_and_what_is_refused_at_the_end
     );
     let last: f64 = said
         .lines()
-        .find_map(|line| {
-            line.trim()
-                .strip_prefix("last ")?
-                .trim()
-                .split_whitespace()
-                .nth(1)
-        })
+        .find_map(|line| line.trim().strip_prefix("last ")?.split_whitespace().nth(1))
         .and_then(|value| value.parse().ok())
         .unwrap();
     assert!((149.0..151.0).contains(&last), "{said}");

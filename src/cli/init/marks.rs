@@ -193,15 +193,21 @@ fn verdict_of(columns: &[&Vec<String>]) -> MarkVerdict {
         return found.clone();
     }
     let sure = |wanted| {
-        each.iter().find_map(|one| match one {
-            MarkVerdict::Sure(mark, cell) if *mark == wanted => Some(cell),
-            _ => None,
+        each.iter().find_map(|one| {
+            if let MarkVerdict::Sure(mark, cell) = one {
+                (*mark == wanted).then_some(cell)
+            } else {
+                None
+            }
         })
     };
     let open = |wanted| {
-        each.iter().find_map(|one| match one {
-            MarkVerdict::Open(mark, cell) if *mark == wanted => Some(cell),
-            _ => None,
+        each.iter().find_map(|one| {
+            if let MarkVerdict::Open(mark, cell) = one {
+                (*mark == wanted).then_some(cell)
+            } else {
+                None
+            }
         })
     };
     let parted = |part: fn(&MarkedCells) -> &Vec<String>| {
@@ -242,7 +248,9 @@ pub(super) fn decimal(
     let columns = MarkColumns::of(survey, stated, is_reading);
     let others = verdict_of(&columns.others);
     match (verdict_of(&columns.readings), others) {
-        (MarkVerdict::Sure(mark, _), _) => Ok(mark),
+        (MarkVerdict::Sure(mark, _), _) | (MarkVerdict::Nothing, MarkVerdict::Sure(mark, _)) => {
+            Ok(mark)
+        }
         (MarkVerdict::Contradiction(point, comma), _)
         | (MarkVerdict::Nothing, MarkVerdict::Contradiction(point, comma)) => {
             Err(contradiction(&point, &comma))
@@ -251,7 +259,10 @@ pub(super) fn decimal(
             MarkVerdict::Open(DecimalMark::Point, point),
             MarkVerdict::Sure(DecimalMark::Comma, comma),
         ) => Err(contradiction(&point, &comma)),
-        (MarkVerdict::Open(DecimalMark::Point, _), _) => Ok(DecimalMark::Point),
+        (MarkVerdict::Open(DecimalMark::Point, _), _)
+        | (MarkVerdict::Nothing, MarkVerdict::Open(DecimalMark::Point, _)) => {
+            Ok(DecimalMark::Point)
+        }
         (MarkVerdict::Open(DecimalMark::Comma, _), MarkVerdict::Sure(DecimalMark::Comma, _)) => {
             Ok(DecimalMark::Comma)
         }
@@ -260,7 +271,6 @@ pub(super) fn decimal(
             "numbers like {cell:?}: the comma may stand before decimals or part thousands; \
              give --decimal comma or --thousands comma"
         )),
-        (MarkVerdict::Nothing, MarkVerdict::Sure(mark, _) | MarkVerdict::Open(mark, _)) => Ok(mark),
         (MarkVerdict::Nothing, MarkVerdict::Nothing) => Ok(match verdict_of(&columns.rest) {
             MarkVerdict::Sure(mark, _) => mark,
             MarkVerdict::Nothing | MarkVerdict::Open(..) | MarkVerdict::Contradiction(..) => {

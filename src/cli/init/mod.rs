@@ -198,21 +198,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
                 continue;
             }
         };
-        let day_zero = written.is_in_days.then(|| {
-            let stated = args.file.epoch.map(DayZero::Stated);
-            stated.unwrap_or(DayZero::Open)
-        });
-        let mut source = PlannedSource {
-            id: source_id(file, &sources),
-            kind,
-            path: relative(file, &args.output_config)?,
-            dialect: written.dialect,
-            zone: written
-                .zone
-                .filter(|_| written.needs_zone && args.file.time_zone.is_none()),
-            day_zero,
-            is_beside: false,
-        };
+        let mut source = planned(file, kind, written, &sources, args)?;
         match held(file, &source, args)? {
             FoundInFile::Benchmarks(found) => {
                 for benchmark in found {
@@ -256,6 +242,30 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
         averaging: args.file.averaging.map(in_words),
         evacuation_time: args.evacuation_time.map(in_seconds),
         hook: args.hook.clone(),
+    })
+}
+
+/// The source of a file that is written so, after those `before` it.
+fn planned(
+    file: &Path,
+    kind: SourceKind,
+    written: Written,
+    before: &[PlannedSource],
+    args: &Args,
+) -> anyhow::Result<PlannedSource> {
+    let day_zero = written.is_in_days.then(|| {
+        let stated = args.file.epoch.map(DayZero::Stated);
+        stated.unwrap_or(DayZero::Open)
+    });
+    let takes_named = written.needs_zone && args.file.time_zone.is_none();
+    Ok(PlannedSource {
+        id: source_id(file, before),
+        kind,
+        path: relative(file, &args.output_config)?,
+        dialect: written.dialect,
+        zone: written.zone.filter(|_| takes_named),
+        day_zero,
+        is_beside: false,
     })
 }
 

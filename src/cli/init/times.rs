@@ -82,19 +82,16 @@ pub(super) fn find(
             .collect::<Result<Vec<usize>, String>>()?,
     };
     let cells = joined(survey, &columns);
-    let format = match &stated.time_format {
-        Some(format) => format.clone(),
-        None => {
-            let found = format_of(&cells, decimal)
-                .and_then(|format| with_all_hours(&cells, format, decimal));
-            found.map_err(|problem| {
-                let names: Vec<&str> = columns
-                    .iter()
-                    .map(|at| survey.names[*at].as_str())
-                    .collect();
-                format!("column {:?}: {problem}", names.join(" and "))
-            })?
-        }
+    let format = if let Some(format) = &stated.time_format {
+        format.clone()
+    } else {
+        let found = format_of(&cells, decimal);
+        let found = found.and_then(|format| with_all_hours(&cells, format, decimal));
+        found.map_err(|problem| {
+            let names = columns.iter().map(|at| survey.names[*at].as_str());
+            let names: Vec<&str> = names.collect();
+            format!("column {:?}: {problem}", names.join(" and "))
+        })?
     };
     let names = columns.iter().map(|at| survey.names[*at].clone());
     let is_usual = |name: &String| name.eq_ignore_ascii_case("time");

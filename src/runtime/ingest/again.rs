@@ -11,11 +11,15 @@ pub(super) struct HeaderReadings(Vec<(String, BenchmarkId, Unit)>);
 impl HeaderReadings {
     fn of(layout: &Layout) -> Self {
         let columns = layout.names.iter().zip(&layout.columns);
-        let readings = columns.filter_map(|(name, column)| match column {
-            Column::Reading {
+        let readings = columns.filter_map(|(name, column)| {
+            if let Column::Reading {
                 benchmark, unit, ..
-            } => Some((name.clone(), benchmark.clone(), *unit)),
-            _ => None,
+            } = column
+            {
+                Some((name.clone(), benchmark.clone(), *unit))
+            } else {
+                None
+            }
         });
         Self(readings.collect())
     }

@@ -14,6 +14,11 @@ use std::path::Path;
 /// Rows that are looked at.
 const MOST_ROWS: usize = 200_000;
 
+/// What is expected where rows are others than their header says,
+const THE_HEADER: &str = "the header of the rows; where other lines stand before it, skip_lines (--skip-lines) with their number";
+/// and where their cells cannot be told apart.
+const A_DELIMITER: &str = "commas, semicolons or tabs between the cells: let the logger write one of them, or replace what stands there";
+
 /// A table of text, read as nothing but cells.
 #[derive(Debug, Clone)]
 pub struct Survey {
@@ -48,14 +53,21 @@ pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
                 Cow::Owned(latin1(line).unwrap_or_default())
             })
         });
+    let bad = |line, column: &str, problem, expected| IngestError::Header {
+        file: file.into(),
+        line,
+        column: column.to_owned(),
+        problem,
+        expected,
+    };
     if bytes.contains(&b'\r') && !bytes.contains(&b'\n') {
-        return Err(IngestError::Header {
-            file: file.into(),
-            line: 1,
-            column: "(any)".to_owned(),
-            problem: "its lines end in carriage returns alone",
-            expected: "line feeds: tr '\\r' '\\n' writes them",
-        });
+        let problem = "its lines end in carriage returns alone";
+        return Err(bad(
+            1,
+            "(any)",
+            problem,
+            "line feeds: tr '\\r' '\\n' writes them",
+        ));
     }
     let empty = |missing| IngestError::Empty {
         file: file.into(),
@@ -68,23 +80,15 @@ pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
     let header = header.strip_prefix('\u{feff}').unwrap_or(&header);
     let delimiter = (dialect.delimiter).unwrap_or_else(|| Delimiter::of_header(header));
     let (mut splitter, mut cells) = (Splitter::new(delimiter), StringRecord::new());
-    let split = splitter.split(header, &mut cells);
-    split.map_err(|found| IngestError::BadHeader {
-        file: file.into(),
-        line,
-        found,
-    })?;
-    let mut names: Vec<String> = cells.iter().map(str::to_owned).collect();
+    if let Err(found) = splitter.split(header, &mut cells) {
+        let file = file.into();
+        return Err(IngestError::BadHeader { file, line, found });
+    }
+    let names: Vec<String> = cells.iter().map(str::to_owned).collect();
     if let ([only], None) = (&names[..], dialect.delimiter)
         && let Some(problem) = other_delimiter(only)
     {
-        return Err(IngestError::Header {
-            file: file.into(),
-            line,
-            column: names.swap_remove(0),
-            problem,
-            expected: "commas, semicolons or tabs between the cells: let the logger write one of them, or replace what stands there",
-        });
+        return Err(bad(line, only, problem, A_DELIMITER));
     }
     if names.is_empty() {
         return Err(empty("header"));
@@ -92,14 +96,36 @@ pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
     // Behind a last mark there may be nothing, with no name.
     let unnamed = names.iter().rev().take_while(|name| name.is_empty());
     let least = names.len() - unnamed.count();
-    let (mut columns, mut is_other_table) = (vec![Vec::new(); names.len()], false);
+    let columns = match columns(lines, header, &mut splitter, (least, names.len())) {
+        Ok(columns) if columns.iter().all(Vec::is_empty) => return Err(empty("row")),
+        Ok(columns) => columns,
+        Err(problem) => {
+            return Err(bad(line, &names[0], problem, THE_HEADER));
+        }
+    };
+    Ok(Survey {
+        delimiter,
+        names,
+        columns,
+        encoding,
+    })
+}
+
+/// The cells of each column below `header`, in rows of at least and at most so many cells.
+fn columns<'a>(
+    lines: impl Iterator<Item = Cow<'a, str>>,
+    header: &str,
+    splitter: &mut Splitter,
+    (least, most): (usize, usize),
+) -> Result<Vec<Vec<String>>, &'static str> {
+    let mut cells = StringRecord::new();
+    let (mut columns, mut is_other_table) = (vec![Vec::new(); most], false);
     for line in lines.take(MOST_ROWS) {
         // A logger that starts again writes its header again.
         if line.trim_end() == header.trim_end() {
             continue;
         }
-        if splitter.split(&line, &mut cells).is_ok() && (least..=names.len()).contains(&cells.len())
-        {
+        if splitter.split(&line, &mut cells).is_ok() && (least..=most).contains(&cells.len()) {
             for (index, column) in columns.iter_mut().enumerate() {
                 column.push(cells.get(index).unwrap_or_default().to_owned());
             }
@@ -108,23 +134,9 @@ pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
         }
     }
     if is_other_table && columns.iter().all(Vec::is_empty) {
-        return Err(IngestError::Header {
-            file: file.into(),
-            line,
-            column: names.swap_remove(0),
-            problem: "no row below has as many cells",
-            expected: "the header of the rows; where other lines stand before it, skip_lines (--skip-lines) with their number",
-        });
+        return Err("no row below has as many cells");
     }
-    if columns.iter().all(Vec::is_empty) {
-        return Err(empty("row"));
-    }
-    Ok(Survey {
-        delimiter,
-        names,
-        columns,
-        encoding,
-    })
+    Ok(columns)
 }
 
 /// What parts the names of a header that has no comma, semicolon or tab.

@@ -42,7 +42,7 @@ impl PreviewCovariate {
                 .retain(|(_, value)| value.to_bits() != mark.to_bits());
         }
         if self.view.kind == CovariateKind::Rain {
-            self.view.remarks.extend(self.total());
+            self.view.remarks.push(self.total());
         }
         self.view
     }
@@ -73,24 +73,24 @@ impl PreviewCovariate {
             .then_some(first)
     }
 
-    fn total(&self) -> Option<String> {
+    fn total(&self) -> String {
         let values: Vec<f64> = self.values.iter().map(|(_, value)| *value).collect();
         let Some(total) = RunningTotal::of(&values) else {
-            return Some(self.as_it_falls());
+            return self.as_it_falls();
         };
         let Some((first, _)) = total
             .set_back
             .first()
             .and_then(|place| self.values.get(*place))
         else {
-            return Some("a running total of rain, which is never set back".to_owned());
+            return "a running total of rain, which is never set back".to_owned();
         };
         let times = match total.set_back.len() {
             1 => "once".to_owned(),
             many => format!("{many} times"),
         };
-        Some(format!(
+        format!(
             "a running total of rain, set back {times}, first at {first}: explain and the monitor's searches go on from what it was"
-        ))
+        )
     }
 }

@@ -125,7 +125,7 @@ pub struct BenchmarkPreview {
     pub every_s: Option<i64>,
     /// What in them hardly means what was intended, with its evidence.
     pub suspicions: Vec<String>,
-    /// The first correction, and where the unit changes.
+    /// The first correction, where the unit changes, and the age of the newest reading where it is old.
     pub remarks: Vec<String>,
 }
 
@@ -179,7 +179,7 @@ pub struct CovariateView {
     pub last: Timestamp,
     /// What in them hardly means what was intended, with its evidence.
     pub suspicions: Vec<String>,
-    /// Whether rain is a running total, and how often that is set back.
+    /// Whether rain is taken as it falls or as a running total, and how often that is set back.
     pub remarks: Vec<String>,
 }
 
