@@ -4,6 +4,7 @@ use super::args::{OutputArgs, OutputFormat};
 use super::{exit, preview as text};
 use crate::config::{self, ConfigError, ConfigProblem, ConfigSummary};
 use crate::reading::plain;
+use crate::runtime::doctor;
 use crate::runtime::inherited::InheritedReadings;
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::sampling;
@@ -110,6 +111,10 @@ fn look(file: &Path, summary: &mut ConfigSummary) -> Result<Preview, ConfigError
     summary
         .warnings
         .extend(inherited.map(|line| format!("{place}: warning: {line}")));
+    let unstartable = doctor::unstartable(&config).into_iter();
+    summary
+        .warnings
+        .extend(unstartable.map(|line| format!("{place}: warning: {line}")));
     let sampling_warnings = sampling::sampling_warnings(&config, &preview).into_iter();
     summary
         .warnings

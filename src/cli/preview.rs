@@ -119,6 +119,7 @@ fn benchmark_lines(text: &mut String, benchmark: &BenchmarkPreview, zone: &TimeZ
         out_of_range,
         first,
         last,
+        moved_mm: _,
         every_s,
         suspicions,
         remarks,

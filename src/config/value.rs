@@ -34,9 +34,39 @@ pub(crate) fn instant(text: &str) -> Result<Timestamp, String> {
     })
 }
 
-/// A time zone by its IANA name: `Europe/Rome`.
+/// A time zone by its IANA name, `Europe/Rome`, or by an offset of whole hours that never changes, `+01:00` or `UTC+1`.
 pub(crate) fn time_zone(text: &str) -> Result<TimeZone, String> {
-    TimeZone::get(text).map_err(|_| "write an IANA name, such as \"Europe/Rome\"".to_owned())
+    let by_name = TimeZone::get(text);
+    by_name.or_else(|_| {
+        let zone = fixed_zone(text).and_then(|name| TimeZone::get(&name).ok());
+        zone.ok_or_else(|| {
+            "write an IANA name, such as \"Europe/Rome\", or an offset of whole hours, such as \"+01:00\", which is Etc/GMT-1"
+                .to_owned()
+        })
+    })
+}
+
+/// The IANA name of an offset of whole hours, whose sign is the other way round: `Etc/GMT-1` of `+01:00`.
+fn fixed_zone(text: &str) -> Option<String> {
+    let plain = text.trim().to_ascii_uppercase();
+    let bare = plain.strip_prefix("UTC").or(plain.strip_prefix("GMT"));
+    let offset = bare.unwrap_or(&plain).trim();
+    let (sign, rest) = match (offset.strip_prefix('+'), offset.strip_prefix('-')) {
+        (Some(rest), _) => ('-', rest),
+        (None, Some(rest)) => ('+', rest),
+        (None, None) => return None,
+    };
+    let rest = rest
+        .strip_suffix(":00")
+        .or(rest.strip_suffix("00").filter(|rest| rest.len() == 2));
+    let hours = rest.unwrap_or(offset.get(1..)?);
+    if !(1..=2).contains(&hours.len()) || !hours.bytes().all(|digit| digit.is_ascii_digit()) {
+        return None;
+    }
+    match hours.parse::<u8>().ok()? {
+        0 => Some("UTC".to_owned()),
+        hours => Some(format!("Etc/GMT{sign}{hours}")),
+    }
 }
 
 /// A speed in mm/day: `1 m/day`, `50 mm/day`.
@@ -132,6 +162,29 @@ pub(super) fn raised_level(text: &str) -> Result<Level, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_offset_of_whole_hours_is_a_time_zone() {
+        for (text, name) in [
+            ("Europe/Rome", "Europe/Rome"),
+            ("+01:00", "Etc/GMT-1"),
+            ("UTC+1", "Etc/GMT-1"),
+            ("GMT-03:00", "Etc/GMT+3"),
+            ("+0800", "Etc/GMT-8"),
+            ("utc+00:00", "UTC"),
+            ("Etc/GMT+3", "Etc/GMT+3"),
+        ] {
+            let zone = time_zone(text);
+            let found = zone.as_ref().map(|zone| zone.iana_name());
+            assert_eq!(found, Ok(Some(name)), "{text}");
+        }
+        for text in ["+05:30", "+1:0", "Roma", "+99", "+"] {
+            assert!(
+                time_zone(text).is_err_and(|why| why.contains("Etc/GMT-1")),
+                "{text}"
+            );
+        }
+    }
 
     #[test]
     fn a_value_with_a_unit_comes_out_in_millimetres_and_days() {

@@ -357,6 +357,13 @@ impl History {
         newest.iter().map(|one| one.value / factor).collect()
     }
 
+    /// The values of the readings as [`History::as_read`] gives them, the newest first.
+    pub(super) fn newest_first(&self, unit: Unit) -> impl Iterator<Item = f64> {
+        let factor = unit.factor();
+        let newest_first = self.observations.values.iter().rev();
+        newest_first.map(move |one| one.value / factor)
+    }
+
     /// Whether a reading has the value of the newest one, or one of a sensor that stands at the end of its range, and
     /// comes after it.
     pub(super) fn is_repeated_by(&self, source: MeasuredAs, reading: &Reading) -> bool {

@@ -247,6 +247,11 @@ impl ThousandsMark {
         )
     }
 
+    /// Whether the same stands before decimals elsewhere.
+    pub fn may_be_decimal(self) -> bool {
+        matches!(self, Self::Comma | Self::Point)
+    }
+
     fn is(self, one: char) -> bool {
         match self {
             Self::Comma => one == ',',

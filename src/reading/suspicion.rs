@@ -194,6 +194,18 @@ pub fn may_still_have_another_scale(values: &[f64], unit: &str) -> bool {
     }
 }
 
+/// Whether these values, but for marks of no value, span more than readings in metres that are taken for `unit` would: as few of them
+/// are looked at as show it.
+pub fn have_moved(values: impl IntoIterator<Item = f64>, unit: &str) -> bool {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let values = values.into_iter().filter(|value| !is_mark(*value));
+    unit == "mm"
+        && values.into_iter().any(|value| {
+            (low, high) = (low.min(value), high.max(value));
+            high - low >= SMALL_MM
+        })
+}
+
 fn are_in_thousandths<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
     values.into_iter().all(|value| is_whole(value * 1e3))
 }

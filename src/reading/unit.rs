@@ -49,6 +49,8 @@ impl fmt::Display for Quantity {
 /// A unit of length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LengthUnit {
+    /// Micrometre.
+    Micrometre,
     /// Millimetre.
     Millimetre,
     /// Centimetre.
@@ -62,7 +64,8 @@ pub enum LengthUnit {
 }
 
 impl LengthUnit {
-    const ALL: [Self; 5] = [
+    const ALL: [Self; 6] = [
+        Self::Micrometre,
         Self::Millimetre,
         Self::Centimetre,
         Self::Metre,
@@ -70,20 +73,27 @@ impl LengthUnit {
         Self::Foot,
     ];
 
-    /// The symbol in files: `mm cm m in ft`.
+    /// The symbol in output: `um mm cm m in ft`.
     pub fn symbol(self) -> &'static str {
+        self.spellings()[0]
+    }
+
+    /// The symbol, and how files write it besides.
+    fn spellings(self) -> &'static [&'static str] {
         match self {
-            Self::Millimetre => "mm",
-            Self::Centimetre => "cm",
-            Self::Metre => "m",
-            Self::Inch => "in",
-            Self::Foot => "ft",
+            Self::Micrometre => &["um", "\u{b5}m", "\u{3bc}m"],
+            Self::Millimetre => &["mm"],
+            Self::Centimetre => &["cm"],
+            Self::Metre => &["m"],
+            Self::Inch => &["in", "inch", "inches"],
+            Self::Foot => &["ft", "foot", "feet"],
         }
     }
 
     /// Millimetres in one of this unit.
     pub fn millimetres(self) -> f64 {
         match self {
+            Self::Micrometre => 1e-3,
             Self::Millimetre => 1.0,
             Self::Centimetre => 10.0,
             Self::Metre => 1000.0,
@@ -96,6 +106,8 @@ impl LengthUnit {
 /// The time in a velocity's denominator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum TimeUnit {
+    /// Minute.
+    Minute,
     /// Hour.
     Hour,
     /// Day of 24 hours.
@@ -105,11 +117,12 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
-    const ALL: [Self; 3] = [Self::Hour, Self::Day, Self::Year];
+    const ALL: [Self; 4] = [Self::Minute, Self::Hour, Self::Day, Self::Year];
 
-    /// The word in output: `h`, `day`, `yr`.
+    /// The word in output: `min`, `h`, `day`, `yr`.
     pub fn symbol(self) -> &'static str {
         match self {
+            Self::Minute => "min",
             Self::Hour => "h",
             Self::Day => "day",
             Self::Year => "yr",
@@ -118,7 +131,8 @@ impl TimeUnit {
 
     fn spellings(self) -> &'static [&'static str] {
         match self {
-            Self::Hour => &["h", "hour"],
+            Self::Minute => &["min", "minute"],
+            Self::Hour => &["h", "hour", "hr"],
             Self::Day => &["day", "d"],
             Self::Year => &["yr", "year", "a"],
         }
@@ -127,6 +141,7 @@ impl TimeUnit {
     /// Days in one of this unit.
     pub fn days(self) -> f64 {
         match self {
+            Self::Minute => 1.0 / 1440.0,
             Self::Hour => 1.0 / 24.0,
             Self::Day => 1.0,
             Self::Year => 365.25,
@@ -146,7 +161,7 @@ pub enum Unit {
 /// A unit that is not one of those known.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "unknown unit {given:?}: expected mm, cm, m, in or ft, or one of these per h, day or yr (mm_per_h, m/day)"
+    "unknown unit {given:?}: expected um, mm, cm, m, in or ft, or one of these per min, h, day or yr (mm_per_h, m/day)"
 )]
 pub struct UnitError {
     /// The text that was given.
@@ -200,7 +215,7 @@ impl Unit {
         let (length, time) = split_rate(&plain);
         let length = LengthUnit::ALL
             .into_iter()
-            .find(|unit| unit.symbol() == length)
+            .find(|unit| unit.spellings().contains(&length))
             .ok_or_else(fail)?;
         match time {
             None => Ok(Self::Length(length)),
@@ -246,7 +261,7 @@ impl JsonSchema for Unit {
         json_schema!({
             "type": "string",
             "description": "The unit of a benchmark's readings: a length, or a length per time.",
-            "pattern": "^(mm|cm|m|in|ft)(/(h|day|yr))?$",
+            "pattern": "^(um|mm|cm|m|in|ft)(/(min|h|day|yr))?$",
         })
     }
 }
@@ -266,6 +281,18 @@ mod tests {
     fn a_unit_is_read_in_every_spelling_that_files_use() {
         for text in ["mm_per_day", "mm/d", "mm per day", " MM/Day "] {
             assert_eq!(Unit::parse(text).unwrap(), Unit::MM_PER_DAY, "{text}");
+        }
+        for (text, millimetres) in [
+            ("\u{b5}m", 1e-3),
+            ("\u{3bc}m", 1e-3),
+            ("um", 1e-3),
+            ("Inches", 25.4),
+            ("feet", 304.8),
+            ("in/day", 25.4),
+            ("mm/min", 1440.0),
+        ] {
+            let factor = Unit::parse(text).unwrap().factor();
+            assert!((factor / millimetres - 1.0).abs() < 1e-12, "{text}");
         }
         assert!((Unit::parse("ft").unwrap().factor() - 304.8).abs() < 1e-12);
         assert!((Unit::parse("m/yr").unwrap().factor() - 1000.0 / 365.25).abs() < 1e-12);

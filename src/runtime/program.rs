@@ -44,6 +44,11 @@ fn runnable(program: &Path) -> Result<String, String> {
                  write them again with sed -i 's/\\r$//' {name}"
             ));
         }
+        HookStart::Text => {
+            return Err(format!(
+                "{name}: its first line names no interpreter, and the kernel runs no text without one; begin it with #!/bin/sh"
+            ));
+        }
         HookStart::Script(words) => words,
     };
     for word in &words {
@@ -69,6 +74,8 @@ enum HookStart {
     Binary,
     /// What its first line names, and for `env` what that would start.
     Script(Vec<PathBuf>),
+    /// Text without such a line, or nothing.
+    Text,
     /// A first line that ends in a carriage return, which the kernel takes for a part of the name.
     Windows,
 }
@@ -79,7 +86,15 @@ fn start(program: &Path) -> std::io::Result<HookStart> {
         .take(FIRST_LINE_BYTES)
         .read_to_end(&mut start)?;
     let Some(line) = start.strip_prefix(b"#!") else {
-        return Ok(HookStart::Binary);
+        // Programs of every kind have bytes of no text at their beginning.
+        let is_text = start
+            .iter()
+            .all(|byte| !byte.is_ascii_control() || byte.is_ascii_whitespace());
+        return Ok(if is_text {
+            HookStart::Text
+        } else {
+            HookStart::Binary
+        });
     };
     let line = line.split(|byte| *byte == b'\n').next().unwrap_or(line);
     if line.ends_with(b"\r") {

@@ -3,7 +3,7 @@
 use super::preview::Preview;
 use crate::config::Config;
 use crate::monitor::MAY_SKIP;
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, Timestamp, figure};
 use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -48,6 +48,7 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
     let absent = preview.unfed.iter().map(|unfed| unfed.text.clone());
     lines
         .chain(suspicions)
+        .chain(exceeded(config, preview))
         .chain(covariates)
         .chain(shared)
         .chain(behind)
@@ -55,6 +56,30 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
         .chain(ends)
         .chain(absent)
         .collect()
+}
+
+/// A line for each threshold that the newest reading is beyond: its level would be in force from the start.
+fn exceeded(config: &Config, preview: &Preview) -> Vec<String> {
+    let settings = &config.settings;
+    let mut lines = Vec::new();
+    for benchmark in &preview.benchmarks {
+        let id = &benchmark.id;
+        let policy = settings.benchmarks.get(id).unwrap_or(&settings.policy);
+        for threshold in &policy.thresholds {
+            if let (Some(limit), Some(moved)) = (threshold.displacement_mm, benchmark.moved_mm)
+                && moved >= limit
+            {
+                lines.push(format!(
+                    "benchmark {:?}: it has moved by {} mm since its first reading, and the threshold displacement = \"{limit} mm\" calls {} from there \
+                     on: it is exceeded already; is it meant from another zero?",
+                    id.as_str(),
+                    figure(moved, 1),
+                    threshold.level
+                ));
+            }
+        }
+    }
+    lines
 }
 
 /// A line for each benchmark of which several readings wait before the first is judged.

@@ -276,18 +276,18 @@ fn init_says_of_a_file_without_readings_what_it_has_and_suggests_no_wrong_unit()
             "none of its columns (time, remark) holds numbers",
         ),
         (
-            format!("time,d_um\n{row},4\n"),
-            "--column \"d_um=P1:displacement:UNIT\"; a UNIT is mm, cm",
+            format!("time,d_dm\n{row},4\n"),
+            "--column \"d_dm=P1:displacement:UNIT\"; a UNIT is um, mm, cm",
         ),
         (
-            format!("time,rate_mm_per_min\n{row},4\n"),
-            "--column \"rate_mm_per_min=P1:velocity:UNIT\"",
+            format!("time,rate [mm/s]\n{row},4\n"),
+            "--column \"rate [mm/s]=P1:velocity:UNIT\"",
         ),
         (
             format!("time,way_cm\n{row},4\n"),
             "--column \"way_cm=P1:displacement:cm\"",
         ),
-        ("time,P1_displacement_mm\n".to_owned(), "found no row"),
+        ("time,P1_displacement_mm\n".to_owned(), "no row below it"),
     ];
     for (text, wanted) in cases {
         let office = Office::with(&[("slope.csv", &text)]);
@@ -626,9 +626,10 @@ fn of_values() -> [Counted<'static>; 4] {
         Counted {
             source: "kind = \"csv\"",
             files: vec![("a.csv", format!("{}{in_metres}", table(&in_utc(12))))],
-            counts: Some((12, 0, 0)),
+            counts: Some((13, 0, 0)),
             said: &[
-                "a.csv, line 15: its unit was mm and is m, expected the unit that the file began with",
+                "line 14: a header that comes again has \"P1_displacement_m\" in m, and it was \"P1_displacement_mm\" in mm before",
+                "last  2026-10-24T00:00:00Z  29.5 mm",
             ],
         },
     ]
@@ -676,11 +677,10 @@ fn check_counts_as_readings_what_the_daemon_takes_and_says_what_it_refuses() {
             counts.map(|(a, b, c)| ((a, b), c)),
             "{source}: {json}"
         );
-        // The daemon takes each correction too, and notes where a reading is missing as its unit is another.
+        // The daemon takes each correction too.
         let daemon = office.run_logged(&["run", "site.toml"]);
         let (readings, corrected, repeated) = counts.unwrap_or_default();
-        let marks = u64::from(said.iter().any(|part| part.contains("its unit was")));
-        let taken = readings + corrected + marks;
+        let taken = readings + corrected;
         let taken = format!("taken={taken} repeated={repeated} ");
         office.until("all is read", || office.log().contains("caught up"));
         let log = office.log();

@@ -171,8 +171,10 @@ fn a_unit_in_a_columns_name_is_the_one_that_is_proposed_and_another_one_is_remar
     let proposals = [
         ("Prisma 1 [m]", "Prisma 1 [m]=P1:displacement:m\""),
         ("E [mm/h]", "E [mm/h]=P1:velocity:mm_per_h\""),
-        ("L (um)", "L (um)=P1:displacement:UNIT\""),
-        ("V [mm/min]", "V [mm/min]=P1:velocity:UNIT\""),
+        ("L (um)", "L (um)=P1:displacement:um\""),
+        ("L (dm)", "L (dm)=P1:displacement:UNIT\""),
+        ("V [mm/min]", "V [mm/min]=P1:velocity:mm_per_min\""),
+        ("V [mm/s]", "V [mm/s]=P1:velocity:UNIT\""),
     ];
     for (column, proposed) in proposals {
         let table = rows(60, |time, value| format!("{time}+00:00,{value}\n"));
@@ -197,11 +199,12 @@ fn columns_named_as_readings_in_a_unit_that_is_not_known_are_remarked() {
         "C_velocity_m_per_s",
         "D_displacement_km",
         "E_velocity_mm_s",
-        "F_displacement_um",
+        "F_displacement_dm",
+        "G displacement [\u{b5}m]",
     ];
     let header = format!("time,P1_displacement_mm,{}", names.join(","));
     let (_, said) = begun(&header, |time, value| {
-        format!("{time}+00:00,{value},1,2,3,{value}\n")
+        format!("{time}+00:00,{value},1,2,3,{value},5\n")
     });
     for name in names {
         let remark = format!("column {name:?}: named like a reading");
@@ -257,4 +260,83 @@ fn a_table_for_a_config_is_one_line_and_score_names_both_ways_to_end() {
         "{said}"
     );
     assert!(fs::metadata(office.path("state")).is_err());
+}
+
+#[test]
+fn one_cell_with_a_comma_does_not_change_how_the_readings_are_read() {
+    let text = rows(200, |time, value| {
+        let odd = if (value - 25.0).abs() < 0.1 {
+            "\"12,5\""
+        } else {
+            ""
+        };
+        format!("{time}Z,2{value:05.2}0,{odd}\n")
+    });
+    let text = format!("time,P1_displacement_mm,Bemerkung\n{text}");
+    let office = Office::with(&[("slope.csv", &text)]);
+    let said = office.done(&["init", "slope.csv"]);
+    assert!(
+        said.contains("first 2017-06-01T00:00:00Z  200 mm"),
+        "{said}"
+    );
+    let config = fs::read_to_string(office.path("site.toml")).unwrap();
+    assert!(!config.contains("decimal"), "{config}");
+    // A battery's voltage in all rows is a question.
+    let text = rows(200, |time, value| {
+        format!("{time}Z,2{value:05.2}0,\"12,6\"\n")
+    });
+    let text = format!("time,P1_displacement_mm,battery_V\n{text}");
+    let office = Office::with(&[("slope.csv", &text)]);
+    let said = office.refused(2, &["init", "slope.csv"]);
+    for part in ["\"200.000\"", "\"12,6\"", "--decimal point"] {
+        assert!(said.contains(part), "no {part:?} in {said}");
+    }
+    office.done(&["init", "slope.csv", "--decimal", "point"]);
+    let config = fs::read_to_string(office.path("site.toml")).unwrap();
+    assert!(!config.contains("thousands"), "{config}");
+    // Where most readings would be refused nothing is written.
+    let args = ["init", "slope.csv", "--decimal", "comma", "--force"];
+    let said = office.refused(2, &args);
+    assert!(said.contains("no row of the file can be used"), "{said}");
+    let text = rows(200, |time, value| {
+        let reading = if value < 20.0 {
+            value.to_string()
+        } else {
+            format!("{value} mm")
+        };
+        format!("{time}Z,{reading},0.5\n")
+    });
+    let text = format!("time,P1_displacement_mm,rain_mm\n{text}");
+    let said = Office::with(&[("slope.csv", &text)]).refused(2, &["init", "slope.csv"]);
+    assert!(
+        said.contains("160 of 200 readings of benchmark \"P1\" cannot be used"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_year_of_two_digits_in_front_is_read_as_such_or_asked_about() {
+    let of = |pattern: &'static str, count: i64| {
+        let text = rows(count, |time, value| {
+            format!("{},{value}\n", time.strftime(pattern))
+        });
+        let text = format!("time,P1_displacement_mm\n{text}");
+        Office::with(&[("slope.csv", &text)])
+    };
+    let args = ["init", "slope.csv", "--time-zone", "UTC"];
+    for pattern in ["%y/%m/%d %H:%M", "%y-%m-%d %H:%M:%S", "%y.%m.%d %H:%M"] {
+        // From the 1st to the 6th: the days of other years as well.
+        let said = of(pattern, 140).refused(2, &args);
+        assert!(
+            said.contains("can be read in several ways") && said.contains(pattern),
+            "{pattern}: {said}"
+        );
+        // Over the end of the month only one of them goes one way.
+        let said = of(pattern, 24 * 40).done(&args);
+        assert!(
+            said.contains("last  2017-07-10T23:00:00Z"),
+            "{pattern}: {said}"
+        );
+        assert!(said.contains("days old"), "{pattern}: {said}");
+    }
 }

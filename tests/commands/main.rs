@@ -14,6 +14,7 @@ mod first_day;
 mod first_site;
 mod init_flags;
 mod logger_exports;
+mod misread;
 mod office;
 #[cfg(feature = "parquet")]
 mod parquet;

@@ -1,32 +1,36 @@
 //! `init FILE...`: from files of readings to a site file.
 
+mod clock;
 mod dated;
 mod dialect;
+mod held;
 mod inherited;
 mod long;
+mod marks;
 mod said;
 mod text;
 mod times;
 mod unnamed;
 
-use super::args::{DialectArgs, FileArgs, OutputArgs, say_remarks};
+use super::args::{DialectArgs, FileArgs, OutputArgs};
 use super::check;
 use super::exit::{self, NoSuchReadings, UsageError};
 use crate::config::{SourceKind, value};
-use crate::reading::{BenchmarkId, Dialect, Quantity, SummerTime, TimeFormat, Timestamp, Unit};
+use crate::reading::{Dialect, SummerTime, TimeFormat, Timestamp};
 use crate::runtime::ingest::{
-    FileSurvey, Measure, ReadOptions, TextFormat, UnitChange, look_through, read_with_remarks,
-    survey, text_format_of, unpacked_name,
+    IngestError, Measure, ReadOptions, read_with_remarks, survey, text_format_of, unit_in_name,
+    unpacked_name,
 };
 use anyhow::Context;
 use dialect::Written;
+use held::{FoundInFile, held};
 use inherited::inherits_nothing;
 use jiff::SignedDuration;
+use jiff::tz::TimeZone;
 pub(super) use said::ConfigWritten;
 use said::{say_beside, say_next, say_written};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use unnamed::{covariates_alone, without_readings};
 
 /// Write a site's config from files of readings: what they hold, how they are written, what to do next
 ///
@@ -61,6 +65,10 @@ pub(super) struct Args {
     output: OutputArgs,
 }
 
+/// What is said of a table that has a header alone.
+const NO_ROW: &str = "found a header and no row below it: how times and numbers are written is seen in the rows; run init again once the \
+                      logger has written some, or give a former file of it and then write this one's path into the config";
+
 /// What the config will say.
 #[derive(Debug)]
 struct InitPlan {
@@ -83,6 +91,8 @@ struct PlannedSource {
     kind: SourceKind,
     path: String,
     dialect: Dialect,
+    /// The zone of its times, where no flag gives one and the name of their column does.
+    zone: Option<TimeZone>,
     /// Day 0, where its times are days.
     day_zero: Option<DayZero>,
     /// Whether it has covariates and no benchmark.
@@ -188,18 +198,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
                 continue;
             }
         };
-        let day_zero = written.is_in_days.then(|| {
-            let stated = args.file.epoch.map(DayZero::Stated);
-            stated.unwrap_or(DayZero::Open)
-        });
-        let mut source = PlannedSource {
-            id: source_id(file, &sources),
-            kind,
-            path: relative(file, &args.output_config)?,
-            dialect: written.dialect,
-            day_zero,
-            is_beside: false,
-        };
+        let mut source = planned(file, kind, written, &sources, args)?;
         match held(file, &source, args)? {
             FoundInFile::Benchmarks(found) => {
                 for benchmark in found {
@@ -246,6 +245,30 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
     })
 }
 
+/// The source of a file that is written so, after those `before` it.
+fn planned(
+    file: &Path,
+    kind: SourceKind,
+    written: Written,
+    before: &[PlannedSource],
+    args: &Args,
+) -> anyhow::Result<PlannedSource> {
+    let day_zero = written.is_in_days.then(|| {
+        let stated = args.file.epoch.map(DayZero::Stated);
+        stated.unwrap_or(DayZero::Open)
+    });
+    let takes_named = written.needs_zone && args.file.time_zone.is_none();
+    Ok(PlannedSource {
+        id: source_id(file, before),
+        kind,
+        path: relative(file, &args.output_config)?,
+        dialect: written.dialect,
+        zone: written.zone.filter(|_| takes_named),
+        day_zero,
+        is_beside: false,
+    })
+}
+
 fn in_seconds(span: SignedDuration) -> String {
     format!("{}s", span.as_secs())
 }
@@ -274,21 +297,6 @@ fn twice(file: &Path, other: &PlannedBenchmark) -> String {
         file.display(),
         other.id,
         other.source
-    )
-}
-
-fn another_unit(file: &Path, change: &UnitChange) -> String {
-    let UnitChange {
-        benchmark,
-        line,
-        was,
-        is,
-    } = change;
-    format!(
-        "{}, line {line}: benchmark {:?}: the unit was {was} and is {is}; a file has one unit for each benchmark, so put what follows into \
-         a file of its own, or write those rows in {was}",
-        file.display(),
-        benchmark.as_str()
     )
 }
 
@@ -329,14 +337,20 @@ fn written(
     let has_zone = args.file.time_zone.is_some();
     let found = match kind {
         SourceKind::Csv => {
-            let survey = survey(file, &args.file.dialect.dialect())?;
+            let survey = match survey(file, &args.file.dialect.dialect()) {
+                Err(IngestError::Empty { missing: "row", .. }) => {
+                    return Ok(Err(vec![NO_ROW.to_owned()]));
+                }
+                surveyed => surveyed?,
+            };
             if let Some(remark) = &survey.encoding {
                 exit::complain(&format_args!("{}: {remark}", file.display()));
             }
-            let written = dialect::written(&survey, &args.file.dialect);
+            let columns = &args.file.columns;
+            let is_mapped = |name: &str| columns.iter().any(|map| map.column == name);
+            let is_reading = |name: &str| is_mapped(name) || unit_in_name(name).is_some();
+            let written = dialect::written(&survey, &args.file.dialect, &is_reading);
             written.and_then(|written| {
-                let columns = &args.file.columns;
-                let is_mapped = |name: &str| columns.iter().any(|map| map.column == name);
                 match long::names_of_points(&survey, &written.dialect, &is_mapped) {
                     Some(problem) => Err(vec![problem]),
                     None => Ok(written),
@@ -349,11 +363,17 @@ fn written(
                 ..Dialect::default()
             },
             needs_zone: kind == SourceKind::Toa5,
+            zone: None,
             is_in_days: false,
         }),
     };
+    if let (Ok(written), Some(stated)) = (&found, &args.file.time_zone) {
+        let names = written.dialect.time_columns.iter();
+        let doubts = names.filter_map(|name| clock::another_zone(name, stated));
+        doubts.for_each(|doubt| exit::complain(&format_args!("{}: {doubt}", file.display())));
+    }
     Ok(found.and_then(|written| {
-        if written.needs_zone && !has_zone {
+        if written.needs_zone && !has_zone && written.zone.is_none() {
             return Err(vec![
                 "its times state no offset: give --time-zone with the zone of the logger's clock, such as Europe/Rome \
                  or UTC (and --dst standard for a clock that is never put forward)"
@@ -370,82 +390,6 @@ fn stated_format(kind: SourceKind, stated: &DialectArgs) -> TimeFormat {
     stated
         .filter(|_| kind == SourceKind::Ndjson)
         .unwrap_or_default()
-}
-
-/// What a file holds.
-enum FoundInFile {
-    Benchmarks(Vec<PlannedBenchmark>),
-    /// Covariates by their names, and what is said of it where no other file has a benchmark.
-    Covariates(Vec<String>, String),
-    /// Which flag names its benchmarks.
-    Open(String),
-    /// What is wrong with it, so that no flag mends it.
-    Bad(String),
-}
-
-fn held(file: &Path, source: &PlannedSource, args: &Args) -> anyhow::Result<FoundInFile> {
-    let options = ReadOptions {
-        dialect: source.dialect.clone(),
-        ..args.file.options()
-    };
-    let looked = look(file, source.kind, &options)?;
-    if let Some(change) = &looked.unit_change {
-        return Ok(FoundInFile::Bad(another_unit(file, change)));
-    }
-    let stated = |benchmark: &BenchmarkId, unit: Unit| {
-        let mut maps = args.file.columns.iter();
-        let map =
-            maps.find(|map| map.benchmark == *benchmark && map.measure == Measure::Reading(unit));
-        map.map(|map| (map.column.clone(), unit.to_string()))
-    };
-    let found = looked
-        .readings
-        .iter()
-        .map(|(benchmark, unit)| PlannedBenchmark {
-            id: benchmark.as_str().to_owned(),
-            source: source.id.clone(),
-            column: stated(benchmark, *unit),
-            is_velocity: unit.quantity() == Quantity::Velocity,
-            has_both: false,
-        });
-    let found: Vec<PlannedBenchmark> = found.collect();
-    if found.is_empty() {
-        let problem = without_readings(file, &looked);
-        return Ok(match covariates_alone(&looked) {
-            Some(names) => FoundInFile::Covariates(names, problem),
-            // Where a flag helps, what is said names it.
-            None if problem.contains("--") => FoundInFile::Open(problem),
-            None => FoundInFile::Bad(problem),
-        });
-    }
-    Ok(FoundInFile::Benchmarks(one_quantity_each(found)))
-}
-
-/// The displacement of each benchmark that has its velocity too: the config names each benchmark once.
-fn one_quantity_each(mut found: Vec<PlannedBenchmark>) -> Vec<PlannedBenchmark> {
-    let with = |velocity: bool, found: &[PlannedBenchmark]| -> BTreeSet<String> {
-        let of_it = found.iter().filter(|one| one.is_velocity == velocity);
-        of_it.map(|one| one.id.clone()).collect()
-    };
-    let (displacements, velocities) = (with(false, &found), with(true, &found));
-    found.retain(|one| !one.is_velocity || !displacements.contains(&one.id));
-    for one in &mut found {
-        one.has_both = !one.is_velocity && velocities.contains(&one.id);
-    }
-    found
-}
-
-fn look(file: &Path, kind: SourceKind, options: &ReadOptions) -> anyhow::Result<FileSurvey> {
-    let Some(format) = TextFormat::named(kind.name()) else {
-        let read = read_with_remarks(&[file.to_owned()], options)?;
-        say_remarks(&read.remarks);
-        let series = read.recording.series.into_iter();
-        return Ok(FileSurvey {
-            readings: series.map(|one| (one.benchmark, one.unit)).collect(),
-            ..FileSurvey::default()
-        });
-    };
-    Ok(look_through(format, file, options)?)
 }
 
 fn source_id(file: &Path, before: &[PlannedSource]) -> String {

@@ -70,11 +70,9 @@ fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPla
         source.kind.name(),
         quoted(&source.path)
     );
-    if let Some(zone) = plan
-        .zone
-        .as_ref()
-        .filter(|_| source.kind != SourceKind::Mcap)
-    {
+    let named = source.zone.as_ref().and_then(|zone| zone.iana_name());
+    let zone = plan.zone.as_deref().or(named);
+    if let Some(zone) = zone.filter(|_| source.kind != SourceKind::Mcap) {
         let _ = writeln!(
             text,
             "time_zone = {}          # of times that state no offset",

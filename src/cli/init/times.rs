@@ -1,16 +1,19 @@
 //! Which columns of a table give the time, and how it is written there.
 
+use super::clock;
 use crate::cli::args::DialectArgs;
 use crate::reading::{DecimalMark, Dialect, LocalClock, SummerTime, TimeFormat, Timestamp};
 use crate::runtime::ingest::Survey;
+use jiff::SignedDuration;
 use jiff::fmt::strtime::BrokenDownTime;
 use jiff::tz::TimeZone;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Ways to write a date that are tried.
-const DATES: [&str; 15] = [
+const DATES: [&str; 18] = [
     "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y",
-    "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%d-%m-%y", "%m-%d-%y", "%d-%b-%Y", "%d %b %Y",
+    "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%d-%m-%y", "%m-%d-%y", "%y.%m.%d", "%y/%m/%d", "%y-%m-%d",
+    "%d-%b-%Y", "%d %b %Y",
 ];
 /// And a time of day after it.
 const TIMES: [&str; 6] = [
@@ -44,6 +47,8 @@ const NAMES_OF_TIMES: [&str; 8] = [
 ];
 /// Cells that are no date, in a column of dates: a repeated header, a line of totals.
 const MOST_ODD: usize = 20;
+/// Steps of the times that are larger and go both ways show that they are in no order.
+const DISORDER: SignedDuration = SignedDuration::from_hours(36);
 /// Earlier than any recording: a year of two digits read as one of four.
 const EARLIEST: Timestamp = Timestamp::constant(-2_524_608_000, 0);
 
@@ -77,15 +82,16 @@ pub(super) fn find(
             .collect::<Result<Vec<usize>, String>>()?,
     };
     let cells = joined(survey, &columns);
-    let format = match &stated.time_format {
-        Some(format) => format.clone(),
-        None => format_of(&cells, decimal).map_err(|problem| {
-            let names: Vec<&str> = columns
-                .iter()
-                .map(|at| survey.names[*at].as_str())
-                .collect();
+    let format = if let Some(format) = &stated.time_format {
+        format.clone()
+    } else {
+        let found = format_of(&cells, decimal);
+        let found = found.and_then(|format| with_all_hours(&cells, format, decimal));
+        found.map_err(|problem| {
+            let names = columns.iter().map(|at| survey.names[*at].as_str());
+            let names: Vec<&str> = names.collect();
             format!("column {:?}: {problem}", names.join(" and "))
-        })?,
+        })?
     };
     let names = columns.iter().map(|at| survey.names[*at].clone());
     let is_usual = |name: &String| name.eq_ignore_ascii_case("time");
@@ -97,6 +103,46 @@ pub(super) fn find(
             _ => names,
         },
         format,
+    })
+}
+
+/// The format itself, unless the times are those of a clock of 12 hours.
+fn with_all_hours(
+    cells: &[String],
+    format: TimeFormat,
+    decimal: DecimalMark,
+) -> Result<TimeFormat, String> {
+    let pattern = match &format {
+        TimeFormat::Rfc3339 => "rfc3339",
+        TimeFormat::Pattern(pattern) if pattern.contains("%H") => pattern,
+        TimeFormat::Pattern(_)
+        | TimeFormat::UnixSeconds
+        | TimeFormat::UnixMilliseconds
+        | TimeFormat::ExcelDays => return Ok(format),
+    };
+    let times = instants(cells, &format, decimal);
+    match clock::of_twelve_hours(&times, pattern) {
+        Some(problem) => Err(problem),
+        None => Ok(format),
+    }
+}
+
+/// The times on the logger's clock, taken as UTC.
+fn instants(cells: &[String], format: &TimeFormat, decimal: DecimalMark) -> Vec<Timestamp> {
+    let dialect = reader(decimal, format.clone());
+    let times = cells.iter();
+    times
+        .filter_map(|cell| dialect.instant(cell, &anywhere()).ok())
+        .collect()
+}
+
+/// The column that says of each row whether it is before or after noon.
+fn half_of_day(survey: &Survey) -> Option<usize> {
+    survey.columns.iter().position(|cells| {
+        let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
+        let is_half =
+            |cell: &String| cell.eq_ignore_ascii_case("AM") || cell.eq_ignore_ascii_case("PM");
+        filled.peek().is_some() && filled.all(is_half)
     })
 }
 
@@ -126,7 +172,8 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
     if let Some(at) = named("time")
         && !is_all_times_of_day(survey, at)
     {
-        return Ok(TimeColumns::Times(vec![at]));
+        let half = half_of_day(survey);
+        return Ok(TimeColumns::Times([at].into_iter().chain(half).collect()));
     }
     if named("t_days").is_some() {
         return Ok(TimeColumns::Days);
@@ -142,12 +189,17 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
         .copied()
         .filter(|at| is_dated(survey, *at, decimal));
     let dated: Vec<usize> = dated.collect();
+    let half = half_of_day(survey);
     match (&dated[..], &of_day[..]) {
         ([date], []) => match days_alone(survey, *date, decimal) {
             Some(problem) => Err(problem),
-            None => Ok(TimeColumns::Times(vec![*date])),
+            None => Ok(TimeColumns::Times(
+                [*date].into_iter().chain(half).collect(),
+            )),
         },
-        ([date], [time]) => Ok(TimeColumns::Times(vec![*date, *time])),
+        ([date], [time]) => Ok(TimeColumns::Times(
+            [*date, *time].into_iter().chain(half).collect(),
+        )),
         ([], _) => Err(format!(
             "no column gives a time that is known; the header has {:?}: give --time-column NAME (twice where date and \
              time stand in two), and --time-format, such as \"%d.%m.%Y %H:%M\"; where other lines stand before the header, \
@@ -202,45 +254,22 @@ fn days_alone(survey: &Survey, date: usize, decimal: DecimalMark) -> Option<Stri
     ))
 }
 
-/// Whether a cell is hours, minutes and perhaps seconds, parted by colons, with `AM` or `PM` or without.
-fn is_time_of_day(cell: &str) -> bool {
-    let plain = cell
-        .trim_end_matches(['A', 'P', 'a', 'p', 'M', 'm'])
-        .trim_end();
-    let has_half = ["AM", "PM", "am", "pm"]
-        .iter()
-        .any(|half| cell.ends_with(half));
-    let clock = if has_half { plain } else { cell };
-    let parts: Vec<&str> = clock.split(':').collect();
-    let is_part =
-        |part: &&str| (1..=2).contains(&part.len()) && part.bytes().all(|c| c.is_ascii_digit());
-    (2..=3).contains(&parts.len()) && parts.iter().all(is_part)
-}
-
-/// Whether a cell may be a time of day in a column that is named so: `0930`, `093000`, `09.30`, `09h30` or `09`.
-fn may_be_time_of_day(cell: &str) -> bool {
-    let digits: String = cell.replacen(['.', 'h'], "", 1);
-    let is_all = digits.bytes().all(|c| c.is_ascii_digit());
-    let part = |at: usize| {
-        digits
-            .get(at..at + 2)
-            .and_then(|part| part.parse::<u8>().ok())
-    };
-    let is_clock = match digits.len() {
-        2 => part(0) <= Some(24),
-        4 | 6 => part(0) <= Some(24) && part(2) < Some(60) && part(4) < Some(60),
-        _ => false,
-    };
-    is_all && is_clock
-}
-
 fn is_all_times_of_day(survey: &Survey, at: usize) -> bool {
     let name = survey.names[at].to_lowercase();
     let is_named = NAMES_OF_TIMES_OF_DAY.iter().any(|part| name.contains(part));
     let cells = survey.columns[at].iter();
     let mut filled = cells.filter(|cell| !cell.is_empty()).peekable();
     filled.peek().is_some()
-        && filled.all(|cell| is_time_of_day(cell) || is_named && may_be_time_of_day(cell))
+        && filled
+            .all(|cell| clock::is_time_of_day(cell) || is_named && clock::may_be_time_of_day(cell))
+}
+
+/// Whether the numbers of a column may be times, by its name.
+pub(super) fn may_be_time(survey: &Survey, at: usize) -> bool {
+    let name = survey.names[at].to_lowercase();
+    NAMES_OF_TIMES.iter().any(|part| name.contains(part))
+        || name == "t_days"
+        || is_all_times_of_day(survey, at)
 }
 
 /// Whether a column holds dates: numbers only where its name says that too.
@@ -276,7 +305,7 @@ fn format_of(cells: &[String], decimal: DecimalMark) -> Result<TimeFormat, Strin
     if let Some(format) = of_numbers(cells, decimal) {
         return Ok(format);
     }
-    let formats = matching(cells, decimal);
+    let formats = in_order(matching(cells, decimal), cells, decimal);
     match &formats[..] {
         [only] => Ok(only.clone()),
         [] => Err(format!(
@@ -294,6 +323,21 @@ fn format_of(cells: &[String], decimal: DecimalMark) -> Result<TimeFormat, Strin
             ))
         }
     }
+}
+
+/// Those of several formats by which the times go one way; all of them where none does.
+fn in_order(formats: Vec<TimeFormat>, cells: &[String], decimal: DecimalMark) -> Vec<TimeFormat> {
+    if formats.len() < 2 {
+        return formats;
+    }
+    let goes_one_way = |format: &&TimeFormat| {
+        let times = instants(cells, format, decimal);
+        let steps = || times.windows(2).map(|pair| pair[1].duration_since(pair[0]));
+        // Clocks are put back, and rows of one day change places.
+        !(steps().any(|step| step > DISORDER) && steps().any(|step| step < -DISORDER))
+    };
+    let ordered: Vec<TimeFormat> = formats.iter().filter(goes_one_way).cloned().collect();
+    if ordered.is_empty() { formats } else { ordered }
 }
 
 /// The word or pattern of the config.

@@ -43,9 +43,17 @@ pub(super) fn without_readings(file: &Path, looked: &FileSurvey) -> String {
         .filter(|(name, meaning)| numbers.contains(&name.as_str()) && !is_covariate(name, meaning));
     let first = of_points.map(|(name, _)| name.as_str()).next();
     let first = first.unwrap_or("NAME");
+    let stated = looked.units_line.get(first);
+    let in_which = stated.map_or_else(String::new, |stated| {
+        format!(" (the units line has {stated:?} for {first:?}, which is no unit that can be read)")
+    });
     let (quantity, unit) = match unit_at_end(first) {
         Some(unit) => (unit.quantity().name(), unit.column_suffix()),
         // The name says nothing of a unit, or one that is not known.
+        None if stated.is_some_and(|stated| stated.contains('/')) => {
+            ("velocity", "UNIT".to_owned())
+        }
+        None if stated.is_some() => ("displacement", "UNIT".to_owned()),
         None if first.contains("_per_") || first.contains('/') => ("velocity", "UNIT".to_owned()),
         None if first.contains(['_', '[', '(']) => ("displacement", "UNIT".to_owned()),
         None => ("displacement", "mm".to_owned()),
@@ -53,11 +61,24 @@ pub(super) fn without_readings(file: &Path, looked: &FileSurvey) -> String {
     let example = format!("{first}=P1:{quantity}:{unit}");
     format!(
         "{}: {named}; its columns of numbers are \
-         {}: say which of them has the readings of which point, in which unit, as in --column {example:?}; a UNIT is mm, cm, m, \
-         in or ft, or one of these per h, day or yr (mm_per_day): what is in another one must be converted first",
+         {}: say which of them has the readings of which point, in which unit{in_which}, as in --column {example:?}; a UNIT is um, mm, cm, \
+         m, in or ft, or one of these per min, h, day or yr (mm_per_day): what is in another one must be converted first",
         file.display(),
         numbers.join(", ")
     )
+}
+
+/// What is wrong with a benchmark of which most readings cannot be used.
+pub(super) fn mostly_refused(file: &Path, looked: &FileSurvey) -> Option<String> {
+    let mut counts = looked.counts.iter();
+    let (benchmark, (taken, refused)) = counts.find(|(_, (taken, refused))| refused > taken)?;
+    let fault = looked.fault.as_ref()?;
+    Some(format!(
+        "{}: {refused} of {} readings of benchmark {:?} cannot be used; the first row that cannot: {fault}",
+        file.display(),
+        taken + refused,
+        benchmark.as_str()
+    ))
 }
 
 /// The covariates of a file, where it has numbers and each column of them is named as no reading is.
@@ -118,17 +139,50 @@ fn is_covariate(name: &str, meaning: &Meaning) -> bool {
     (of_covariates && !is_levelling) || unit.is_some_and(|unit| Unit::parse(unit).is_err())
 }
 
-/// The unit that a column's name ends with, after a `_` or in brackets.
+/// The unit that a column's name ends with, after a `_` or a blank or in brackets.
 fn unit_at_end(column: &str) -> Option<Unit> {
-    let ends = column.match_indices('_').map(|(at, _)| &column[at + 1..]);
+    let ends = column
+        .match_indices(['_', ' '])
+        .map(|(at, _)| &column[at + 1..]);
     let ends = ends.chain(bracketed(column));
     unit_in_name(column).or_else(|| ends.into_iter().find_map(|end| Unit::parse(end).ok()))
 }
 
 /// What is said of a column whose name has another unit than is stated of it.
 pub(super) fn other_unit(column: &str, stated: Unit) -> Option<String> {
-    let named = unit_at_end(column).filter(|named| *named != stated)?;
+    let named = match unit_at_end(column) {
+        Some(named) if named == stated => return None,
+        Some(named) => named.to_string(),
+        None => {
+            let named = bracketed(column).filter(|named| !named.is_empty())?;
+            format!("{named:?}, which is no unit that can be read,")
+        }
+    };
     Some(format!(
         "column {column:?} has the unit {named} in its name, and {stated} by --column: it is read in {stated}"
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_in_a_columns_name_that_is_not_the_stated_one_is_said() {
+        for (column, named) in [
+            ("P1 displacement cm", Some("cm")),
+            ("P1 displacement [\u{b5}m]", Some("um")),
+            ("P1 [furlong]", Some("\"furlong\"")),
+            ("P1 displacement mm", None),
+            ("P1", None),
+        ] {
+            let said = other_unit(column, Unit::MM);
+            let is_right = match (&said, named) {
+                (None, None) => true,
+                (Some(said), Some(named)) => said.contains(named),
+                _ => false,
+            };
+            assert!(is_right, "{column}: {said:?}");
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Whether the hooks could be run; none is.
 
 use super::{CheckVerdict, Finding};
-use crate::config::HookConfig;
+use crate::config::{Config, HookConfig};
 use crate::runtime::sandbox::{self, Walls};
 use crate::runtime::ways_out::WAYS_OUT;
 
@@ -21,6 +21,17 @@ pub(super) fn finding(hook: &HookConfig) -> Finding {
         ),
     };
     Finding::new(table, verdict, text)
+}
+
+/// A line for each program of a hook that is there and cannot be run.
+pub fn unstartable(config: &Config) -> Vec<String> {
+    let programs = config.hooks.iter().filter(|hook| hook.to.is_none());
+    let there = programs.filter(|hook| hook.program().is_file());
+    let found = there.map(finding);
+    found
+        .filter(|found| found.verdict == CheckVerdict::Wrong)
+        .map(|found| format!("{}: {}", found.check, found.text))
+        .collect()
 }
 
 /// Whether the kernel would hold the walls, where a hook is to have some.

@@ -9,6 +9,7 @@ mod recordings;
 mod watches;
 
 use crate::config::Config;
+pub use hooks::unstartable;
 use schemars::JsonSchema;
 use serde::Serialize;
 

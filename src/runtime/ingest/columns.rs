@@ -1,6 +1,7 @@
 //! What the columns of a CSV file mean, by their names alone.
 
 use super::column_map::Measure;
+use super::names::{Name, channel_unit, in_brackets, is_unit_of_motion, name_of};
 use super::{IngestError, ReadOptions, Remark};
 use crate::reading::{BenchmarkId, Dialect, Unit};
 use schemars::JsonSchema;
@@ -96,92 +97,6 @@ pub(super) struct SigmaColumn {
     pub(super) unit: Unit,
 }
 
-/// What a column's name says.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Name<'a> {
-    Time,
-    Days,
-    /// The ID, where the name has one.
-    Measure(Option<&'a str>, Measure),
-    Channel(Option<&'a str>),
-    /// `displacement` and the like, with no known unit.
-    WithoutUnit,
-}
-
-/// Words by which a column is one of readings.
-const KEYWORDS: [&str; 3] = ["displacement", "velocity", "sigma"];
-
-/// Reads a column's name.
-pub(super) fn name_of(column: &str) -> Name<'_> {
-    let plain = column.to_ascii_lowercase();
-    match plain.as_str() {
-        "time" => return Name::Time,
-        "t_days" => return Name::Days,
-        _ => {}
-    }
-    for keyword in KEYWORDS {
-        for (at, _) in plain.rmatch_indices(keyword) {
-            if let Some(measure) = measure_at(&plain, at, keyword) {
-                match column[..at].strip_suffix('_') {
-                    None if at == 0 => return Name::Measure(None, measure),
-                    Some(id) if !id.is_empty() => return Name::Measure(Some(id), measure),
-                    _ => {}
-                }
-            }
-        }
-    }
-    if lacks_a_unit(&plain) {
-        return Name::WithoutUnit;
-    }
-    Name::Channel(channel_unit(column))
-}
-
-/// The unit in the name of a column of readings.
-pub fn unit_in_name(column: &str) -> Option<Unit> {
-    if let Name::Measure(_, Measure::Reading(unit)) = name_of(column) {
-        Some(unit)
-    } else {
-        None
-    }
-}
-
-fn measure_at(plain: &str, at: usize, keyword: &str) -> Option<Measure> {
-    let rest = &plain[at + keyword.len()..];
-    let unit = rest.strip_prefix('_').or_else(|| in_brackets(rest))?;
-    let unit = Unit::parse(unit).ok()?;
-    match keyword {
-        "sigma" => Some(Measure::Sigma(unit)),
-        _ if unit.quantity().name() == keyword => Some(Measure::Reading(unit)),
-        _ => None,
-    }
-}
-
-/// `mm/d` of ` [mm/d]` or `(mm/d)`.
-fn in_brackets(rest: &str) -> Option<&str> {
-    let rest = rest.trim();
-    let inner = |open, close| rest.strip_prefix(open)?.strip_suffix(close);
-    inner('[', ']').or_else(|| inner('(', ')')).map(str::trim)
-}
-
-/// What stands in brackets at the end of a name: `mm/h` of `E [mm/h]`.
-pub fn bracketed(name: &str) -> Option<&str> {
-    in_brackets(&name[name.rfind(['[', '('])?..])
-}
-
-/// Words of units of length and of velocity.
-const WORDS_OF_UNITS: [&str; 21] = [
-    "um", "mm", "cm", "dm", "m", "km", "in", "inch", "ft", "per", "s", "sec", "min", "h", "hr",
-    "hour", "d", "day", "month", "yr", "year",
-];
-
-/// Whether a text is a unit of length or of velocity, whether it can be read or not: `m_per_s`, `km`.
-fn is_unit_of_motion(text: &str) -> bool {
-    !text.is_empty()
-        && text
-            .split(['_', '/'])
-            .all(|word| WORDS_OF_UNITS.contains(&word))
-}
-
 /// What to know of a covariate that is named as readings are: `P1_displacement_mm/d` or `P1 displacement mm`.
 fn like_a_reading(name: &str) -> Option<Remark> {
     let plain = name.to_ascii_lowercase();
@@ -189,7 +104,10 @@ fn like_a_reading(name: &str) -> Option<Remark> {
         .into_iter()
         .find_map(|keyword| {
             let (_, rest) = plain.rsplit_once(keyword)?;
-            let unit = rest.strip_prefix('_').or_else(|| in_brackets(rest));
+            let unit = rest
+                .strip_prefix(['_', ' '])
+                .filter(|unit| !unit.starts_with(['[', '(']));
+            let unit = unit.or_else(|| in_brackets(rest));
             let is_one = rest.is_empty()
                 || unit.is_some_and(is_unit_of_motion)
                 || channel_unit(name).is_none();
@@ -201,50 +119,26 @@ fn like_a_reading(name: &str) -> Option<Remark> {
     Some(Remark {
         about: format!("column {name:?}"),
         text: format!(
-            "named like a reading, and taken as a covariate; expected [ID_]displacement_UNIT with mm, cm, m, in or ft, \
-             or [ID_]velocity_UNIT with one of these per h, day or yr (what is in another unit must be converted first); \
+            "named like a reading, and taken as a covariate; expected [ID_]displacement_UNIT with um, mm, cm, m, in or ft, \
+             or [ID_]velocity_UNIT with one of these per min, h, day or yr (what is in another unit must be converted first); \
              or say it with [[benchmark]] column = {name:?} and unit (--column {name:?}=ID:{quantity}:{unit})"
         ),
     })
 }
 
-/// `velocity_kmh` is a reading in a unit that is not known; `displacement_sensor_voltage_v` is a
-/// covariate.
-fn lacks_a_unit(plain: &str) -> bool {
-    KEYWORDS
-        .iter()
-        .filter_map(|keyword| plain.strip_prefix(keyword))
-        .any(|rest| match rest.strip_prefix('_') {
-            None => rest.is_empty(),
-            Some(unit) => !unit.replacen("_per_", "/", 1).contains('_'),
-        })
-}
-
-/// Units at the end of a covariate's name, as loggers and surveys write them.
-const CHANNEL_UNITS: [&str; 41] = [
-    "mm", "cm", "m", "in", "ft", "km", "c", "f", "k", "degc", "degf", "deg_c", "deg_f", "deg",
-    "m3_s", "m3_per_s", "l_s", "l_per_s", "cfs", "m_s", "m_per_s", "km_h", "km_per_h", "pa", "hpa",
-    "kpa", "mpa", "bar", "mbar", "psi", "kn", "percent", "pct", "v", "mv", "ma", "hz", "s", "w_m2",
-    "g", "ppm",
-];
-
-/// The longest known unit at a name's end: `mm_per_day` of `rain_mm_per_day`.
-pub(super) fn channel_unit(name: &str) -> Option<&str> {
-    let is_known = |unit: &&str| {
-        let plain = unit.to_ascii_lowercase();
-        CHANNEL_UNITS.contains(&plain.as_str()) || Unit::parse(&plain).is_ok()
-    };
-    let bracketed = name
-        .find(['[', '('])
-        .and_then(|at| in_brackets(&name[at..]));
-    let suffixes = name.match_indices('_').map(|(at, _)| &name[at + 1..]);
-    bracketed
-        .filter(is_known)
-        .or_else(|| suffixes.into_iter().find(is_known))
+/// That a column's readings are taken in the unit that is stated of their benchmark.
+fn in_stated_unit(name: &str, named: Unit, benchmark: &BenchmarkId, unit: Unit) -> Remark {
+    Remark {
+        about: format!("column {name:?}"),
+        text: format!(
+            "it is named as one in {named}, and taken in {unit}, as unit of [[benchmark]] {:?} says: is that right?",
+            benchmark.as_str()
+        ),
+    }
 }
 
 /// What a column of readings should have.
-const A_UNIT: &str = "a unit at its end: mm, cm, m, in or ft, a velocity per h, day or yr, such as displacement_mm or velocity_mm_per_h";
+const A_UNIT: &str = "a unit at its end: um, mm, cm, m, in or ft, a velocity per min, h, day or yr, such as displacement_mm or velocity_mm_per_h";
 
 /// A header, understood.
 #[derive(Debug, Clone)]
@@ -266,6 +160,83 @@ struct Sigma {
     unit: Unit,
 }
 
+/// The columns of a header, one after another.
+#[derive(Default)]
+struct NamedColumns {
+    columns: Vec<Column>,
+    sigmas: Vec<Sigma>,
+    remarks: Vec<Remark>,
+    /// Benchmarks whose unit is not the one that their column's name has: that one, and theirs.
+    restated: Vec<(BenchmarkId, Unit, Unit)>,
+}
+
+impl NamedColumns {
+    /// Adds the column of this name, or says what is wrong with it and what was expected; `stem` is the benchmark of columns that
+    /// name none.
+    fn take(
+        &mut self,
+        name: &str,
+        stem: &BenchmarkId,
+        options: &ReadOptions,
+    ) -> Result<(), (&'static str, &'static str)> {
+        let map = options.columns.iter().find(|map| map.column == *name);
+        let measured = match map {
+            Some(map) => Ok((Some(map.benchmark.clone()), map.measure)),
+            None => Layout::by_name(name, &options.dialect)?,
+        };
+        let (benchmark, measure) = match measured {
+            Ok((benchmark, measure)) => (benchmark.unwrap_or_else(|| stem.clone()), measure),
+            Err(other) => {
+                let is_covariate = matches!(other, Column::Channel { .. });
+                let remark = is_covariate.then(|| like_a_reading(name)).flatten();
+                self.remarks.extend(remark);
+                self.columns.push(other);
+                return Ok(());
+            }
+        };
+        let column = match measure {
+            Measure::Reading(_) if map.is_none() && options.reserves(&benchmark) => Column::Ignored,
+            Measure::Reading(named) => {
+                let beside = options.unit_beside(&benchmark, named);
+                let beside = beside.filter(|_| map.is_none());
+                if let Some(unit) = beside {
+                    self.remarks
+                        .push(in_stated_unit(name, named, &benchmark, unit));
+                    self.restated.push((benchmark.clone(), named, unit));
+                }
+                Column::Reading {
+                    benchmark,
+                    unit: beside.unwrap_or(named),
+                    sigma: None,
+                }
+            }
+            Measure::Sigma(unit) => {
+                self.sigmas.push(Sigma {
+                    index: self.columns.len(),
+                    benchmark,
+                    unit,
+                });
+                Column::Sigma
+            }
+        };
+        self.columns.push(column);
+        Ok(())
+    }
+
+    /// Where readings are in another unit than their name says, standard errors in that unit are too.
+    fn finish(mut self) -> Self {
+        for sigma in &mut self.sigmas {
+            let of_it = |(id, named, _): &&(BenchmarkId, Unit, Unit)| {
+                *id == sigma.benchmark && *named == sigma.unit
+            };
+            if let Some((.., unit)) = self.restated.iter().find(of_it) {
+                sigma.unit = *unit;
+            }
+        }
+        self
+    }
+}
+
 impl Layout {
     /// `line` is the header's.
     pub(super) fn new(
@@ -282,44 +253,18 @@ impl Layout {
             expected,
         };
         let stem = BenchmarkId::new(file.file_stem().unwrap_or_default().to_string_lossy());
-        let (mut columns, mut sigmas, mut remarks) = (Vec::new(), Vec::new(), Vec::new());
+        let mut named = NamedColumns::default();
         for (index, name) in names.iter().enumerate() {
             Self::name_is_right(name, &names[..index])
+                .and_then(|()| named.take(name, &stem, options))
                 .map_err(|(problem, expected)| fail(name, problem, expected))?;
-            let map = options.columns.iter().find(|map| map.column == *name);
-            let measured = match map {
-                Some(map) => Ok((Some(map.benchmark.clone()), map.measure)),
-                None => Self::by_name(name, &options.dialect)
-                    .map_err(|(problem, expected)| fail(name, problem, expected))?,
-            };
-            let (benchmark, measure) = match measured {
-                Ok((benchmark, measure)) => (benchmark.unwrap_or_else(|| stem.clone()), measure),
-                Err(other) => {
-                    let is_covariate = matches!(other, Column::Channel { .. });
-                    remarks.extend(is_covariate.then(|| like_a_reading(name)).flatten());
-                    columns.push(other);
-                    continue;
-                }
-            };
-            columns.push(match measure {
-                Measure::Reading(_) if map.is_none() && options.reserves(&benchmark) => {
-                    Column::Ignored
-                }
-                Measure::Reading(unit) => Column::Reading {
-                    benchmark,
-                    unit,
-                    sigma: None,
-                },
-                Measure::Sigma(unit) => {
-                    sigmas.push(Sigma {
-                        index,
-                        benchmark,
-                        unit,
-                    });
-                    Column::Sigma
-                }
-            });
         }
+        let NamedColumns {
+            columns,
+            sigmas,
+            remarks,
+            ..
+        } = named.finish();
         let time = match &options.dialect.time_columns[..] {
             [] => vec![Self::time_column(&columns, &names, fail)?],
             stated => Self::stated_time(stated, &names, fail)?,
@@ -471,60 +416,5 @@ impl Layout {
             }
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_name_says_benchmark_quantity_and_unit() {
-        let per_hour = Unit::parse("mm/h").unwrap();
-        let cases = [
-            ("displacement_mm", None, Measure::Reading(Unit::MM)),
-            ("velocity_mm_per_h", None, Measure::Reading(per_hour)),
-            (
-                "31-1930_displacement_mm",
-                Some("31-1930"),
-                Measure::Reading(Unit::MM),
-            ),
-            (
-                "a_b_velocity_mm_per_d",
-                Some("a_b"),
-                Measure::Reading(Unit::MM_PER_DAY),
-            ),
-            ("blkm_sigma_mm", Some("blkm"), Measure::Sigma(Unit::MM)),
-            ("A_Displacement_MM", Some("A"), Measure::Reading(Unit::MM)),
-        ];
-        for (name, id, measure) in cases {
-            assert_eq!(name_of(name), Name::Measure(id, measure), "{name}");
-        }
-    }
-
-    #[test]
-    fn every_other_name_is_a_channel_with_its_longest_unit() {
-        let cases = [
-            ("lake_level_m", Some("m")),
-            ("rain_mm_per_day", Some("mm_per_day")),
-            ("river_flow_cfs", Some("cfs")),
-            ("inflow_m3_s", Some("m3_s")),
-            ("air_temperature_max_f", Some("f")),
-            ("wind_velocity_m_per_s", Some("m_per_s")),
-            ("displacement_sensor_voltage_v", Some("v")),
-            ("humidity_percent", Some("percent")),
-            ("quality", None),
-            ("m", None),
-        ];
-        for (name, unit) in cases {
-            assert_eq!(name_of(name), Name::Channel(unit), "{name}");
-        }
-    }
-
-    #[test]
-    fn a_reading_in_no_known_unit_is_refused_rather_than_taken_for_a_covariate() {
-        for name in ["displacement", "velocity_kmh", "velocity_m_per_s", "sigma"] {
-            assert_eq!(name_of(name), Name::WithoutUnit, "{name}");
-        }
     }
 }

@@ -4,6 +4,7 @@
 //! Every other cell holds one finite number, or a mark that the sensor gave none. Times are kept as
 //! instants: the offset in which they were written is not.
 
+use super::again::HeaderReadings;
 use super::columns::{Layout, Meaning};
 use super::split::Splitter;
 use super::table::TableRows;
@@ -127,6 +128,7 @@ pub struct CsvRows {
     /// The line in force, behind as many as are passed over; none where the latest one was not understood.
     header: Vec<String>,
     table: Option<TableRows>,
+    readings: HeaderReadings,
     splitter: Splitter,
     cells: StringRecord,
 }
@@ -156,6 +158,7 @@ impl CsvRows {
             options: options.clone(),
             header: Vec::new(),
             table: None,
+            readings: HeaderReadings::default(),
             splitter: Splitter::new(delimiter),
             cells: StringRecord::new(),
         };
@@ -250,7 +253,8 @@ impl CsvRows {
 
     fn read_header(&mut self, line: u64, text: &str) -> Result<(), IngestError> {
         let names = self.cells.iter().map(str::to_owned).collect();
-        let layout = Layout::new(&self.file, line, names, &self.options)?;
+        let mut layout = Layout::new(&self.file, line, names, &self.options)?;
+        self.readings.follow(line, &mut layout);
         self.table = Some(TableRows::new(&self.file, layout, &self.options));
         // A reader that goes on from a later line takes them as the file's first: blank ones pass for those before the header.
         let skipped = (0..self.options.dialect.skip_lines).map(|_| String::new());

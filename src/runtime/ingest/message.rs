@@ -8,7 +8,7 @@
 //! `time_base` in the MCAP channel's metadata names, or else since 1970.
 
 use super::Item;
-use super::columns::channel_unit;
+use super::names::channel_unit;
 use crate::reading::{BenchmarkId, Quantity, Reading, Sample, Timestamp, Unit, whole_figure};
 use jiff::SignedDuration;
 use serde::Serialize;
@@ -264,7 +264,7 @@ impl<'a> Fields<'a> {
 
     fn unit(&self, quantity: Quantity) -> Result<Unit, MessageError> {
         let expected = match quantity {
-            Quantity::Displacement => "a unit of displacement: mm, cm, m, in or ft",
+            Quantity::Displacement => "a unit of displacement: um, mm, cm, m, in or ft",
             Quantity::Velocity => "a unit of velocity such as mm/h, mm/day or m/yr",
         };
         let text = self.text("unit")?.unwrap_or_default();

@@ -1,5 +1,6 @@
 //! Files of readings in and out: CSV, NDJSON, TOA5 and MCAP become one [`Recording`], and back.
 
+mod again;
 mod atomic;
 mod bytes;
 mod collect;
@@ -13,6 +14,7 @@ mod mcap;
 mod mcap_stream;
 mod mcap_write;
 mod message;
+mod names;
 mod ndjson;
 mod ndjson_write;
 mod split;
@@ -29,7 +31,7 @@ mod vector;
 
 pub use bytes::{is_packed, unpack, unpacked_name};
 pub use column_map::{ColumnMap, ColumnMapError, Measure};
-pub use columns::{Meaning, bracketed, unit_in_name};
+pub use columns::Meaning;
 pub use convert::{ChannelCount, ConvertReport, ConvertStage, SeriesCount, convert};
 pub use csv::{CSV, CsvRows};
 pub use encoding::{Transcoder, latin1};
@@ -39,17 +41,17 @@ pub(super) use mcap_write::write_mcap_by;
 pub use mcap_write::{encode_mcap, write_mcap};
 pub(super) use message::escape;
 pub use message::{MessageError, decode_message};
+pub use names::{bracketed, unit_in_name};
 pub use ndjson::NDJSON;
 pub use ndjson_write::write_ndjson;
 pub use survey::{Survey, survey};
 pub use table_write::{write_csv, write_toa5};
 pub use taken::{LineResult, Remark};
-pub use text::{FileSurvey, TextRows, UnitChange, look_through};
+pub use text::{FileSurvey, TextRows, look_through};
 pub use text_format::{LineReader, TextFormat};
 pub use text_formats::TEXT_FORMATS;
 pub use toa5::TOA5;
 pub use units::FileUnits;
-pub(super) use units::UNIT_WAS;
 pub use vector::VectorMap;
 
 use taken::BadRows;
@@ -70,6 +72,8 @@ pub struct ReadOptions {
     pub columns: Vec<ColumnMap>,
     /// Benchmarks whose readings stand in those columns alone, and in no other that has their name.
     pub reserved: Vec<BenchmarkId>,
+    /// Units of benchmarks whose columns are known by their names, and which count before those in the names.
+    pub units: Vec<(BenchmarkId, Unit)>,
     /// The span over which velocities are means, for series that state none.
     pub averaging: Option<SignedDuration>,
     /// How times and missing values are written.
@@ -86,6 +90,7 @@ impl Default for ReadOptions {
             epoch: Timestamp::constant(946_684_800, 0),
             columns: Vec::new(),
             reserved: Vec::new(),
+            units: Vec::new(),
             averaging: None,
             conventions: Conventions::default(),
             dialect: Dialect::default(),
@@ -98,6 +103,14 @@ impl ReadOptions {
     /// Whether its readings stand in a column that is given, and in no other.
     fn reserves(&self, benchmark: &BenchmarkId) -> bool {
         self.reserved.contains(benchmark)
+    }
+
+    /// The unit that is stated of a benchmark beside the one that its column's name has.
+    fn unit_beside(&self, benchmark: &BenchmarkId, named: Unit) -> Option<Unit> {
+        let of_it = |(id, unit): &&(BenchmarkId, Unit)| {
+            id == benchmark && unit.quantity() == named.quantity() && *unit != named
+        };
+        self.units.iter().find(of_it).map(|(_, unit)| *unit)
     }
 
     fn averaging_of(&self, unit: Unit, stated: Option<SignedDuration>) -> Option<SignedDuration> {

@@ -58,10 +58,6 @@ pub static NDJSON: TextFormat = TextFormat {
 };
 
 impl LineReader for NdjsonRows {
-    fn states_units(&self) -> bool {
-        true
-    }
-
     fn take(&mut self, line: u64, text: &str) -> LineResult {
         self.row(line, text)
     }

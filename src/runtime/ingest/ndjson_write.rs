@@ -1,7 +1,7 @@
 //! Writes a recording as NDJSON: a message a line, in the order of time. Provenance has no place in it.
 
 use super::IngestError;
-use super::columns::channel_unit;
+use super::names::channel_unit;
 use crate::reading::{Reading, Recording, Timestamp};
 use serde::Serialize;
 use std::io::{self, Write};

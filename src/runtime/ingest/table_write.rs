@@ -5,7 +5,7 @@
 
 use super::IngestError;
 use super::column_map::Measure;
-use super::columns::{Name, name_of};
+use super::names::{Name, name_of};
 use crate::reading::{Conventions, Reading, Recording, Sample, Timestamp, Unit};
 use ::csv::{QuoteStyle, Writer, WriterBuilder};
 use jiff::tz::Offset;

@@ -75,9 +75,9 @@ impl TextRows {
         self.0.is_lost()
     }
 
-    /// As [`LineReader::states_units`].
-    pub fn states_units(&self) -> bool {
-        self.0.states_units()
+    /// As [`LineReader::units_line`].
+    fn units_line(&self) -> BTreeMap<String, String> {
+        self.0.units_line()
     }
 
     /// As [`LineReader::header`].
@@ -135,11 +135,7 @@ pub(super) fn read_text(
             bad.meet(fault)?;
         }
         for item in taken.items {
-            let item = if rows.states_units() {
-                units.convert(item)
-            } else {
-                item
-            };
+            let item = units.convert(item);
             if let Err(odd) = collected.add(item) {
                 bad.meet(IngestError::Inconsistent {
                     file: file.into(),
@@ -198,23 +194,29 @@ pub struct FileSurvey {
     pub columns: Vec<(String, Meaning)>,
     /// Whose readings it has, in which units.
     pub readings: BTreeSet<(BenchmarkId, Unit)>,
-    /// Where the unit of a benchmark first changes within the file.
-    pub unit_change: Option<UnitChange>,
     /// What is wrong with the first row that cannot be used.
     pub fault: Option<IngestError>,
+    /// How many readings of each benchmark can be used, and how many cannot as something is wrong with their rows.
+    pub counts: BTreeMap<BenchmarkId, (usize, usize)>,
+    /// By column what a line of units says of it, where that is no unit that can be read.
+    pub units_line: BTreeMap<String, String>,
 }
 
-/// Another unit of one quantity of a benchmark than before in the same file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct UnitChange {
-    /// Whose.
-    pub benchmark: BenchmarkId,
-    /// The line of the header that says so, or else of the reading.
-    pub line: u64,
-    /// The unit before.
-    pub was: Unit,
-    /// The unit from there on.
-    pub is: Unit,
+impl FileSurvey {
+    /// Counts the readings of one row.
+    fn count(&mut self, items: &[Item], is_faulty: bool) {
+        for item in items {
+            match item {
+                Item::Reading { benchmark, .. } => {
+                    self.counts.entry(benchmark.clone()).or_default().0 += 1;
+                }
+                Item::Missing { benchmark, .. } if is_faulty => {
+                    self.counts.entry(benchmark.clone()).or_default().1 += 1;
+                }
+                Item::Missing { .. } | Item::Sample { .. } => {}
+            }
+        }
+    }
 }
 
 /// Looks through a text file.
@@ -230,45 +232,29 @@ pub fn look_through(
     let bytes = Transcoder::default().feed(&bytes);
     let mut rows = TextRows::new(format, &super::bytes::shown_name(file), options);
     let mut looked = FileSurvey::default();
-    let (mut units, mut last_without) = (BTreeMap::new(), 0);
+    let mut units = FileUnits::default();
     for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
         let text = match std::str::from_utf8(text) {
             Ok(text) => text.to_owned(),
             Err(_) => latin1(text).unwrap_or_default(),
         };
         let taken = rows.take(line, &text);
+        let is_faulty = taken.fault.is_some();
         match taken.fault {
             Some(fault) if rows.is_lost() => return Err(fault),
             fault => looked.fault = looked.fault.or(fault),
         }
-        if taken.items.is_empty() {
-            last_without = line;
-        }
+        looked.count(&taken.items, is_faulty);
         for item in taken.items {
-            let Item::Reading {
+            if let Item::Reading {
                 benchmark, unit, ..
-            } = item
-            else {
-                continue;
-            };
-            let key = (benchmark.clone(), unit.quantity());
-            let (since, was) = *units.entry(key).or_insert((line, unit));
-            if was != unit && since != line && looked.unit_change.is_none() {
-                looked.unit_change = Some(UnitChange {
-                    benchmark: benchmark.clone(),
-                    // A header stands before the first of its rows.
-                    line: if last_without + 1 == line {
-                        last_without
-                    } else {
-                        line
-                    },
-                    was,
-                    is: unit,
-                });
+            } = units.convert(item)
+            {
+                looked.readings.insert((benchmark, unit));
             }
-            looked.readings.insert((benchmark, unit));
         }
     }
     looked.columns = rows.meanings();
+    looked.units_line = rows.units_line();
     Ok(looked)
 }

@@ -4,6 +4,7 @@ use super::columns::Meaning;
 use super::taken::{LineResult, Remark};
 use super::{IngestError, ReadOptions};
 use crate::reading::Recording;
+use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::io::Write;
 use std::path::Path;
@@ -48,9 +49,9 @@ pub trait LineReader: Debug + Send {
         Vec::new()
     }
 
-    /// Whether each line states the unit of its value: another one than before is then no fault.
-    fn states_units(&self) -> bool {
-        false
+    /// By column what a line of units below the header says of it, where that is no unit that can be read.
+    fn units_line(&self) -> BTreeMap<String, String> {
+        BTreeMap::new()
     }
 
     /// Whether a line that is not UTF-8 may be taken as Latin-1: in a table only column names and text could

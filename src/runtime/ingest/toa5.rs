@@ -5,8 +5,10 @@
 //! numbers and the times of extremes are not read. A logger that starts again writes its header
 //! again, in the middle of the file.
 
+use super::again::HeaderReadings;
 use super::column_map::{ColumnMap, Measure};
-use super::columns::{Column, Layout, Meaning, Name, channel_unit, name_of};
+use super::columns::{Column, Layout, Meaning};
+use super::names::{Name, channel_unit, name_of};
 use super::split::Splitter;
 use super::table::TableRows;
 use super::table_write::write_toa5;
@@ -15,8 +17,11 @@ use super::text_format::{LineReader, TextFormat};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{Delimiter, Dialect, Unit};
 use ::csv::StringRecord;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// What stands in the place of a unit of the times.
+const UNITS_OF_TIME: &str = "TS";
 /// Lines of a header: environment, names, units, processing.
 const HEADER_LINES: usize = 4;
 /// How an environment line begins.
@@ -66,6 +71,10 @@ impl LineReader for Toa5Rows {
         }
     }
 
+    fn units_line(&self) -> BTreeMap<String, String> {
+        self.units_line.clone()
+    }
+
     fn columns(&self) -> &[String] {
         self.table.as_ref().map_or(&[], TableRows::names)
     }
@@ -79,6 +88,9 @@ struct Toa5Rows {
     /// The header in force, or as much of it as has come.
     header: Vec<String>,
     table: Option<TableRows>,
+    readings: HeaderReadings,
+    /// By column its unit as the header has it, where that is none that can be read.
+    units_line: BTreeMap<String, String>,
     /// Before the first header that is understood.
     is_new: bool,
     splitter: Splitter,
@@ -98,6 +110,8 @@ impl Toa5Rows {
             },
             header: Vec::new(),
             table: None,
+            readings: HeaderReadings::default(),
+            units_line: BTreeMap::new(),
             is_new: true,
             splitter: Splitter::new(Delimiter::Comma),
             cells: StringRecord::new(),
@@ -153,7 +167,8 @@ impl Toa5Rows {
     fn read_header(&mut self, line: u64) -> Result<(), IngestError> {
         let understood = self.layout(line);
         match understood {
-            Ok(layout) => {
+            Ok(mut layout) => {
+                self.readings.follow(line - 2, &mut layout);
                 self.is_new = false;
                 self.table = Some(TableRows::new(&self.file, layout, &self.options));
                 Ok(())
@@ -189,13 +204,36 @@ impl Toa5Rows {
         let columns = names.iter().zip(&units);
         let meant = columns.map(|(name, unit)| self.full_name(line - 2, name, unit));
         let meant = meant.collect::<Result<Vec<String>, IngestError>>()?;
+        let stated = meant.iter().zip(&units);
+        let unread = stated.filter(|(_, unit)| {
+            let is_known = Unit::parse(unit).is_ok() || known_suffix(unit).is_some();
+            !unit.trim().is_empty() && !is_known && *unit != UNITS_OF_TIME && *unit != "RN"
+        });
+        self.units_line = unread
+            .map(|(name, unit)| (name.clone(), unit.to_owned()))
+            .collect();
         let mut layout = Layout::new(&self.file, line - 2, meant, &self.options)?;
+        layout.remarks.extend(self.doubtful_units());
         for (column, (name, kind)) in layout.columns.iter_mut().zip(names.iter().zip(&processing)) {
             if name == "RECORD" || TIMES_OF_EXTREMES.contains(&kind) {
                 *column = Column::Ignored;
             }
         }
         Ok(layout)
+    }
+
+    /// Columns of readings in the unit that is stated of them, for which the header has one that cannot be read.
+    fn doubtful_units(&self) -> impl Iterator<Item = Remark> {
+        self.options.columns.iter().filter_map(|map| {
+            let named = self.units_line.get(&map.column)?;
+            let (Measure::Reading(unit) | Measure::Sigma(unit)) = map.measure;
+            Some(Remark {
+                about: format!("column {:?}", map.column),
+                text: format!(
+                    "the units line has {named:?} for it, which is no unit that can be read, and it is taken in {unit}: is that right?"
+                ),
+            })
+        })
     }
 
     /// The name with its unit, as a CSV file would have it.
@@ -206,7 +244,12 @@ impl Toa5Rows {
             _ if name == "TIMESTAMP" => return Ok("time".to_owned()),
             (Some(map), _) => (name.to_owned(), Some(map.measure)),
             (None, Name::Measure(_, measure)) => (name.to_owned(), Some(measure)),
-            (None, _) => (with_unit(name, unit, stated), None),
+            (None, _) => {
+                let full = with_unit(name, unit, stated);
+                let mut maps = self.options.columns.iter();
+                let map = maps.find(|map| map.column == full);
+                (full, map.map(|map| map.measure))
+            }
         };
         let meant = meant.map(|(Measure::Reading(unit) | Measure::Sigma(unit))| unit);
         match (meant, stated) {
@@ -230,15 +273,20 @@ fn with_unit(name: &str, unit: &str, stated: Option<Unit>) -> String {
             return full;
         }
     }
+    match known_suffix(unit) {
+        Some(suffix) if channel_unit(name).is_none() => format!("{name}_{suffix}"),
+        Some(_) | None => name.to_owned(),
+    }
+}
+
+/// A unit as the name of a covariate has it at its end, where it is a known one.
+fn known_suffix(unit: &str) -> Option<String> {
     let suffix = unit.trim().to_ascii_lowercase();
     let suffix = suffix
         .replace('/', "_per_")
         .replace(' ', "_")
         .replace('%', "percent");
-    let full = format!("{name}_{suffix}");
-    if channel_unit(name).is_none() && channel_unit(&full).is_some() {
-        full
-    } else {
-        name.to_owned()
-    }
+    channel_unit(&format!("_{suffix}"))
+        .is_some()
+        .then_some(suffix)
 }

@@ -1,13 +1,10 @@
-//! The units that a file began with. In a table another one later is a fault, never another scale; where each line states the unit
-//! of its value, the value is given in the first one.
+//! The units that a file began with. Where a line states another one of its value, or a header of the rows below it, the value is
+//! given in the first one.
 
 use super::Item;
 use crate::reading::{BenchmarkId, Unit};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-
-/// What is said in place of a reading whose unit is another than before begins with this.
-pub(in crate::runtime) const UNIT_WAS: &str = "its unit was";
 
 /// The unit of each quantity of each benchmark so far; to be kept with the place in the file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,29 +12,6 @@ pub(in crate::runtime) const UNIT_WAS: &str = "its unit was";
 pub struct FileUnits(BTreeMap<BenchmarkId, Vec<Unit>>);
 
 impl FileUnits {
-    /// The item itself, or a missing reading where its unit is not the one that the file began with.
-    #[must_use]
-    pub fn guard(&mut self, item: Item) -> Item {
-        let Some(known) = self.first(&item) else {
-            return item;
-        };
-        if let Item::Reading {
-            benchmark,
-            unit,
-            reading,
-            ..
-        } = &item
-            && *unit != known
-        {
-            return Item::Missing {
-                benchmark: benchmark.clone(),
-                time: reading.time,
-                what: format!("{UNIT_WAS} {known} and is {unit}"),
-            };
-        }
-        item
-    }
-
     /// The same value in the unit that the file began with.
     #[must_use]
     pub fn convert(&mut self, mut item: Item) -> Item {
@@ -97,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn where_lines_state_their_units_a_value_is_given_in_the_first_one() {
+    fn a_value_in_another_unit_is_given_in_the_first_one() {
         let mut units = FileUnits::default();
         assert_eq!(units.convert(item(1.0, "mm")), item(1.0, "mm"));
         let Item::Reading { unit, reading, .. } = units.convert(item(0.25, "m")) else {
@@ -107,6 +81,5 @@ mod tests {
         assert!((reading.sigma.unwrap() - 1.0).abs() < 1e-12);
         // A velocity is another quantity, with a first unit of its own.
         assert_eq!(units.convert(item(3.0, "mm/h")), item(3.0, "mm/h"));
-        assert!(matches!(units.guard(item(0.25, "m")), Item::Missing { .. }));
     }
 }

@@ -5,6 +5,7 @@ mod ending;
 mod layout;
 mod recording;
 mod refused;
+mod resets;
 mod stated;
 mod track;
 mod unfed;
@@ -16,11 +17,11 @@ pub use view::{
 };
 
 use super::clock;
-use super::ingest::{Item, Meaning, UNIT_WAS, is_packed, unpack};
+use super::ingest::{Item, Meaning, is_packed, unpack};
 use super::site::{Unproven, Untimely, untimely};
 use super::tail::{Arrival, Decoder, LinesRead, TextReader, list};
 use crate::config::{Config, FileSource, SourceKind};
-use crate::monitor::Input;
+use crate::monitor::{Declared, Input};
 use crate::reading::{
     BenchmarkId, CovariateKind, LocalClock, MissingValues, Quantity, SummerTime, Suspicion,
     Timestamp, suspicion,
@@ -30,6 +31,7 @@ use covariate::PreviewCovariate;
 use ending::RefusedEnds;
 use layout::keep_layout;
 use recording::read_recording;
+use resets::DeclaredResets;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, Read};
@@ -50,6 +52,7 @@ pub fn preview(config: &Config) -> Preview {
     let mut look = PreviewSoFar {
         accepted: config.settings.accepted.clone(),
         stated: config.settings.covariates.clone(),
+        declared: config.settings.declared.clone(),
         now: clock::now(),
         ..PreviewSoFar::default()
     };
@@ -97,6 +100,7 @@ struct PreviewSoFar {
     accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
     /// What the config states of covariates.
     stated: BTreeMap<String, CovariateKind>,
+    declared: Vec<Declared>,
     values: u64,
     now: Timestamp,
 }
@@ -290,7 +294,7 @@ impl PreviewSoFar {
             benchmark, what, ..
         } = arrival.input
         {
-            self.missing(benchmark, &what, place, so_far);
+            Self::missing(benchmark, &what, so_far);
         } else if why.is_none()
             && let Input::Sample {
                 channel,
@@ -320,35 +324,21 @@ impl PreviewSoFar {
                 ..
             } = arrival.input
         {
-            self.ends.take(&source, &benchmark);
             let key = (source.clone(), benchmark.clone(), unit.quantity());
             let accepted = self.accepted.get(&benchmark).cloned().unwrap_or_default();
             let here = (time, reading.value);
+            let declared = &self.declared;
             let track = self.benchmarks.entry(key).or_insert_with(|| {
+                let resets = DeclaredResets::of(declared, &benchmark);
                 let view = BenchmarkPreview::new(benchmark, source, unit, here);
-                PreviewTrack::new(view, unit, accepted)
+                PreviewTrack::new(view, unit, accepted, resets)
             });
             track.take(here, unit, place, why.is_some());
         }
     }
 
     /// A reading that should be there and is not.
-    fn missing(
-        &mut self,
-        benchmark: BenchmarkId,
-        what: &str,
-        place: FilePlace,
-        so_far: &mut SourceSoFar,
-    ) {
-        if what.starts_with(UNIT_WAS) {
-            let at = so_far.name(place);
-            let source = so_far.view.id.as_str();
-            (self.ends).refuse_unit(source, &benchmark, || at.clone(), what);
-            so_far.refused.count(what, || {
-                format!("{at}: {what}, expected the unit that the file began with")
-            });
-            return;
-        }
+    fn missing(benchmark: BenchmarkId, what: &str, so_far: &mut SourceSoFar) {
         // Of a component the mark is followed by its column.
         let mark = what.split(" in ").next().unwrap_or_default();
         let is_mark = what.starts_with("nothing in ") || mark == "null" || so_far.marks.has(mark);

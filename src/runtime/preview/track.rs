@@ -1,5 +1,6 @@
 //! The readings of one quantity of a benchmark, counted as the daemon takes them.
 
+use super::resets::DeclaredResets;
 use super::view::BenchmarkPreview;
 use crate::reading::other_unit::{self, OtherUnit};
 use crate::reading::{LocalClock, Quantity, SummerTime, Suspicion, Timestamp, Unit, suspicion};
@@ -11,6 +12,10 @@ const LATEST: usize = 200;
 /// Readings from which on a sign is doubted, where of all that they go by this share is backwards.
 const FEWEST_STEPS: usize = 10;
 const HALF: f64 = 0.5;
+/// A newest reading that is so many days old is asked about: a logger that is at work gives newer ones.
+const OLD_DAYS: i64 = 30;
+/// And readings that go over so many: dates that are read as others do.
+const LONG_DAYS: i64 = 20 * 365;
 
 /// Where a value stands: the number of its file among those of the source, and its line; 0 in a recording.
 pub(super) type FilePlace = (usize, u64);
@@ -30,6 +35,7 @@ pub(super) struct PreviewTrack {
     unit: Unit,
     /// Suspicions that people have looked into.
     accepted: BTreeSet<Suspicion>,
+    resets: DeclaredResets,
     readings: Vec<ReadValue>,
     /// Those that lie further ahead of the clock than a daemon takes.
     ahead: Vec<ReadValue>,
@@ -80,11 +86,17 @@ impl MergedReadings {
 }
 
 impl PreviewTrack {
-    pub(super) fn new(view: BenchmarkPreview, unit: Unit, accepted: BTreeSet<Suspicion>) -> Self {
+    pub(super) fn new(
+        view: BenchmarkPreview,
+        unit: Unit,
+        accepted: BTreeSet<Suspicion>,
+        resets: DeclaredResets,
+    ) -> Self {
         Self {
             view,
             unit,
             accepted,
+            resets,
             readings: Vec::new(),
             ahead: Vec::new(),
             other_unit: None,
@@ -160,8 +172,10 @@ impl PreviewTrack {
         let mut gaps: Vec<i64> = pairs.map(|(b, a)| b.duration_since(*a).as_secs()).collect();
         gaps.sort_unstable();
         self.view.every_s = gaps.get(gaps.len() / 2).copied();
+        self.view.moved_mm = self.moved_mm();
         self.view.suspicions = self.suspicions(newest, now);
         self.view.remarks = self.remarks(&merged, clock, name);
+        self.view.remarks.extend(self.age(now));
         self.view
     }
 
@@ -206,16 +220,49 @@ impl PreviewTrack {
         remarks
     }
 
+    fn values(&self) -> Vec<(Timestamp, f64)> {
+        let readings = self.readings.iter();
+        readings.map(|one| (one.time, one.value)).collect()
+    }
+
+    fn moved_mm(&self) -> Option<f64> {
+        if self.view.quantity != Quantity::Displacement {
+            return None;
+        }
+        let (values, _) = self.resets.taken_off(&self.values(), self.unit);
+        Some((values.last()?.1 - values.first()?.1) * self.unit.factor())
+    }
+
+    /// What to ask where the newest reading is old, or all of them go over more years than instruments do.
+    fn age(&self, now: Timestamp) -> Option<String> {
+        let (first, last) = (self.readings.first()?.time, self.readings.last()?.time);
+        let days = |from: Timestamp, until: Timestamp| until.duration_since(from).as_hours() / 24;
+        let (old, span) = (days(last, now), days(first, last));
+        if old <= OLD_DAYS && span <= LONG_DAYS {
+            return None;
+        }
+        let span = if span > LONG_DAYS {
+            format!(", and the readings go over {} years", span / 365)
+        } else {
+            String::new()
+        };
+        Some(format!(
+            "the newest reading is {old} days old{span}: if newer ones are in the files, their dates are written in another way: set time_format \
+             (--time-format)"
+        ))
+    }
+
     fn suspicions(&self, newest: Option<Timestamp>, now: Timestamp) -> Vec<String> {
         let ahead = newest
             .and_then(|newest| suspicion::ahead(newest, now))
             .into_iter();
-        let values: Vec<(Timestamp, f64)> = self
-            .readings
-            .iter()
-            .map(|one| (one.time, one.value))
-            .collect();
+        let values = self.values();
         let (quantity, unit) = (self.view.quantity, &self.view.unit);
+        let (values, of_resets) = match quantity {
+            Quantity::Displacement => self.resets.taken_off(&values, self.unit),
+            Quantity::Velocity => (values, Vec::new()),
+        };
+        let backwards = self.moves_backwards(&values);
         let is_accepted = self.accepted.contains(&Suspicion::Scale);
         let other = other_unit::standing(&values, quantity).filter(|_| !is_accepted);
         let of_values = suspicion::of_values(&values, quantity, unit);
@@ -228,26 +275,26 @@ impl PreviewTrack {
         let all = ahead.chain(other).chain(of_values);
         let not_accepted = all.filter(|one| !self.accepted.contains(&one.kind));
         let texts = not_accepted.map(|one| one.text);
-        texts.chain(self.moves_backwards()).collect()
+        texts.chain(of_resets).chain(backwards).collect()
     }
 
     /// What to do where the displacement falls all along, or the velocity is negative.
-    fn moves_backwards(&self) -> Option<String> {
+    fn moves_backwards(&self, values: &[(Timestamp, f64)]) -> Option<String> {
         let (what, motion): (&str, Vec<f64>) = match self.view.quantity {
             Quantity::Displacement => {
-                let pairs = self.readings.windows(2);
-                let steps = pairs.map(|pair| pair[1].value - pair[0].value);
+                let pairs = values.windows(2);
+                let steps = pairs.map(|pair| pair[1].1 - pair[0].1);
                 ("displacement falls", steps.collect())
             }
             Quantity::Velocity => {
-                let values = self.readings.iter().map(|reading| reading.value);
+                let values = values.iter().map(|(_, value)| *value);
                 ("velocity is negative", values.collect())
             }
         };
         let sum: f64 = motion.iter().sum();
         let sizes: f64 = motion.iter().map(|one| one.abs()).sum();
         let is_known = self.accepted.contains(&Suspicion::Fall);
-        let is_backwards = !is_known && self.readings.len() >= FEWEST_STEPS && sum < -HALF * sizes;
+        let is_backwards = !is_known && values.len() >= FEWEST_STEPS && sum < -HALF * sizes;
         is_backwards.then(|| {
             format!(
                 "its {what}: motion counts as positive, and a slope that moves backwards calls no red; if its sign is \

@@ -34,7 +34,7 @@ pub(super) fn unfed(preview: &Preview, config: &Config) -> Vec<Unfed> {
             absent.push(None);
         }
         unfed.extend(absent.into_iter().map(|benchmark| Unfed {
-            text: why(view, benchmark.as_ref()),
+            text: why(view, benchmark.as_ref(), config),
             benchmark,
             source: view.id.clone(),
         }));
@@ -49,7 +49,25 @@ pub(super) fn unfed(preview: &Preview, config: &Config) -> Vec<Unfed> {
     unfed
 }
 
-fn why(view: &SourceView, benchmark: Option<&BenchmarkId>) -> String {
+/// What is said of benchmarks of one source that name one column: none of them is read from a file that is not named after it.
+fn of_one_column(view: &SourceView, benchmark: &BenchmarkId, config: &Config) -> Option<String> {
+    let of_source = || config.benchmarks.iter().filter(|one| one.source == view.id);
+    let column = of_source()
+        .find(|one| one.id == *benchmark)?
+        .column
+        .as_ref()?;
+    let same = of_source().filter(|one| one.column.as_ref() == Some(column));
+    let same: Vec<&str> = same.map(|one| one.id.as_str()).collect();
+    (same.len() > 1).then(|| {
+        format!(
+            "several [[benchmark]] ({}) have column = {column:?}: of them only the one is read that the file is named after; give each its own \
+             column, or its own source",
+            same.join(", ")
+        )
+    })
+}
+
+fn why(view: &SourceView, benchmark: Option<&BenchmarkId>, config: &Config) -> String {
     let SourceView { id, path, .. } = view;
     let whose = benchmark.map_or_else(
         || format!("source {id:?}"),
@@ -66,6 +84,12 @@ fn why(view: &SourceView, benchmark: Option<&BenchmarkId>) -> String {
     if benchmark.is_none() {
         let hint = refused.unwrap_or_else(|| NAME_THEM.to_owned());
         return format!("{whose}: its files have no reading of any benchmark; {hint}");
+    }
+    let of_one_column = benchmark.and_then(|id| of_one_column(view, id, config));
+    if let Some(problem) = of_one_column {
+        return format!(
+            "{whose}: the files that are there have no reading of it, and it is not watched; {problem}"
+        );
     }
     let others: Vec<&str> = view.unwatched.iter().map(BenchmarkId::as_str).collect();
     let others = (!others.is_empty()).then(|| {

@@ -118,11 +118,14 @@ pub struct BenchmarkPreview {
     pub first: (Timestamp, f64),
     /// The latest, its time and value.
     pub last: (Timestamp, f64),
+    /// By how many mm a displacement has changed since the first, less what it jumped by at declared resets.
+    #[serde(skip)]
+    pub moved_mm: Option<f64>,
     /// The median time between the latest, s.
     pub every_s: Option<i64>,
     /// What in them hardly means what was intended, with its evidence.
     pub suspicions: Vec<String>,
-    /// The first correction, and where the unit changes.
+    /// The first correction, where the unit changes, and the age of the newest reading where it is old.
     pub remarks: Vec<String>,
 }
 
@@ -147,6 +150,7 @@ impl BenchmarkPreview {
             out_of_range: 0,
             first,
             last: first,
+            moved_mm: None,
             every_s: None,
             suspicions: Vec::new(),
             remarks: Vec::new(),
@@ -175,7 +179,7 @@ pub struct CovariateView {
     pub last: Timestamp,
     /// What in them hardly means what was intended, with its evidence.
     pub suspicions: Vec<String>,
-    /// Whether rain is a running total, and how often that is set back.
+    /// Whether rain is taken as it falls or as a running total, and how often that is set back.
     pub remarks: Vec<String>,
 }
 

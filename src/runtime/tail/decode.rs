@@ -135,11 +135,17 @@ impl Decoder {
                 measure: Measure::Reading(unit),
             })
         });
+        // Where no column is named, the unit counts before the one in the name of whichever has the benchmark's readings.
+        let units = self.wanted.iter().filter_map(|one| {
+            let by_name = one.column.is_none() && one.vector.is_none();
+            Some((one.id.clone(), one.unit.filter(|_| by_name)?))
+        });
         let defaults = ReadOptions::default();
         let of_a_column = self.wanted.iter().filter(|one| one.column.is_some());
         ReadOptions {
             columns: columns.collect(),
             reserved: of_a_column.map(|one| one.id.clone()).collect(),
+            units: units.collect(),
             vectors: vectors.collect(),
             conventions: self.conventions.clone(),
             dialect: self.dialect.clone(),

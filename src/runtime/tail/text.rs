@@ -134,14 +134,8 @@ impl TextReader {
         fed: &mut LinesRead,
     ) -> (String, Option<DecodeFault>) {
         let taken = self.rows.take(number, &text);
-        let states_units = self.rows.states_units();
         for item in taken.items {
-            let item = if states_units {
-                self.units.convert(item)
-            } else {
-                self.units.guard(item)
-            };
-            fed.items.push((number, item));
+            fed.items.push((number, self.units.convert(item)));
         }
         fed.remarks.extend(taken.remarks);
         (text, taken.fault.map(Into::into))

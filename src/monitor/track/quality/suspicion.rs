@@ -14,6 +14,8 @@ use std::collections::BTreeSet;
 
 /// The latest readings that are examined.
 const INSPECTED: usize = 200;
+/// And those by which a slow slope shows that it moves as its unit says: work is bounded.
+const OF_RECORD: usize = 20_000;
 /// A suspicion ends when so many of the latest readings give no rise to it.
 const CALM: usize = 24;
 
@@ -43,7 +45,9 @@ impl DataQuality {
             let is_late =
                 |one: &DatedSuspicion| since.is_none_or(|since| one.at >= readings[since].0);
             let all = suspicion::of_values(&readings, quantity, &name);
-            found.extend(all.into_iter().filter(is_late));
+            found.extend(all.into_iter().filter(is_late).filter(|one| {
+                one.kind != Suspicion::Scale || !holds_scale || !has_moved(history, unit, &name)
+            }));
             // One step is no fall of the slope and another unit.
             let step = self.other_unit.as_ref().map(OtherUnit::at);
             found.retain(|one| one.kind != Suspicion::Fall || Some(one.at) != step);
@@ -59,7 +63,10 @@ impl DataQuality {
                 && holds_scale
                 && evidence.is_none()
                 && self.unknown.has(Reason::Suspect(kind));
-            if stands && suspicion::may_still_have_another_scale(&values, &name) {
+            if stands
+                && suspicion::may_still_have_another_scale(&values, &name)
+                && !has_moved(history, unit, &name)
+            {
                 continue;
             }
             events.extend(self.weigh(record, time, kind, evidence));
@@ -144,6 +151,11 @@ impl DataQuality {
     }
 }
 
+/// Whether the record shows motion that readings in a larger unit would not, though its latest readings lie close together.
+fn has_moved(history: &History, unit: Unit, name: &str) -> bool {
+    suspicion::have_moved(history.newest_first(unit).take(OF_RECORD), name)
+}
+
 fn newly_in_other_unit(history: &History, unit: Unit) -> Option<OtherUnit> {
     let quantity = unit.quantity();
     let newest = history.with_resets(unit, other_unit::looked_at(quantity));
@@ -159,6 +171,25 @@ fn newly_in_other_unit(history: &History, unit: Unit) -> Option<OtherUnit> {
 mod tests {
     use super::*;
     use crate::monitor::track::fixture::{at, record};
+
+    #[test]
+    fn a_slow_slope_read_finely_is_in_its_own_unit_once_its_record_shows_that_it_moves() {
+        let value = |row: i64| 5.0 + 0.01 * row as f64 + 0.003 * (row * 7 % 5) as f64;
+        let value = |row: i64| (value(row) * 1e3).round() / 1e3;
+        let of = |count: i64| record((0..count).map(value));
+        let suspect = |quality: &mut DataQuality, count: i64| {
+            let source = crate::monitor::track::fixture::DISPLACEMENT;
+            let events = quality.suspect(&of(count), source, at(count - 1), true);
+            events.len()
+        };
+        let mut quality = DataQuality::default();
+        assert_eq!(suspect(&mut quality, 100), 2, "it may be in metres");
+        assert_eq!(suspect(&mut quality, 150), 0, "it still may");
+        assert_eq!(suspect(&mut quality, 400), 2, "it has moved by 4 mm");
+        assert!(!quality.is_unknown());
+        let mut of_all = DataQuality::default();
+        assert_eq!(suspect(&mut of_all, 1000), 0);
+    }
 
     #[test]
     fn a_suspicion_that_people_accept_ends_and_does_not_come_back() {

@@ -1,0 +1,179 @@
+//! What the name of a column says: whose readings it holds, or the unit of a covariate.
+
+use super::column_map::Measure;
+use crate::reading::Unit;
+
+/// What a column's name says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Name<'a> {
+    Time,
+    Days,
+    /// The ID, where the name has one.
+    Measure(Option<&'a str>, Measure),
+    Channel(Option<&'a str>),
+    /// `displacement` and the like, with no known unit.
+    WithoutUnit,
+}
+
+/// Words by which a column is one of readings.
+const KEYWORDS: [&str; 3] = ["displacement", "velocity", "sigma"];
+
+/// Reads a column's name.
+pub(super) fn name_of(column: &str) -> Name<'_> {
+    let plain = column.to_ascii_lowercase();
+    match plain.as_str() {
+        "time" => return Name::Time,
+        "t_days" => return Name::Days,
+        _ => {}
+    }
+    for keyword in KEYWORDS {
+        for (at, _) in plain.rmatch_indices(keyword) {
+            if let Some(measure) = measure_at(&plain, at, keyword) {
+                match column[..at].strip_suffix('_') {
+                    None if at == 0 => return Name::Measure(None, measure),
+                    Some(id) if !id.is_empty() => return Name::Measure(Some(id), measure),
+                    _ => {}
+                }
+            }
+        }
+    }
+    if lacks_a_unit(&plain) {
+        return Name::WithoutUnit;
+    }
+    Name::Channel(channel_unit(column))
+}
+
+/// The unit in the name of a column of readings.
+pub fn unit_in_name(column: &str) -> Option<Unit> {
+    if let Name::Measure(_, Measure::Reading(unit)) = name_of(column) {
+        Some(unit)
+    } else {
+        None
+    }
+}
+
+fn measure_at(plain: &str, at: usize, keyword: &str) -> Option<Measure> {
+    let rest = &plain[at + keyword.len()..];
+    let unit = rest.strip_prefix('_').or_else(|| in_brackets(rest))?;
+    let unit = Unit::parse(unit).ok()?;
+    match keyword {
+        "sigma" => Some(Measure::Sigma(unit)),
+        _ if unit.quantity().name() == keyword => Some(Measure::Reading(unit)),
+        _ => None,
+    }
+}
+
+/// `mm/d` of ` [mm/d]` or `(mm/d)`.
+pub(super) fn in_brackets(rest: &str) -> Option<&str> {
+    let rest = rest.trim();
+    let inner = |open, close| rest.strip_prefix(open)?.strip_suffix(close);
+    inner('[', ']').or_else(|| inner('(', ')')).map(str::trim)
+}
+
+/// What stands in brackets at the end of a name: `mm/h` of `E [mm/h]`.
+pub fn bracketed(name: &str) -> Option<&str> {
+    in_brackets(&name[name.rfind(['[', '('])?..])
+}
+
+/// Words of units of length and of velocity.
+const WORDS_OF_UNITS: [&str; 24] = [
+    "um", "mm", "cm", "dm", "m", "km", "in", "inch", "inches", "ft", "foot", "feet", "per", "s",
+    "sec", "min", "h", "hr", "hour", "d", "day", "month", "yr", "year",
+];
+
+/// Whether a text is a unit of length or of velocity, whether it can be read or not: `m_per_s`, `km`.
+pub(super) fn is_unit_of_motion(text: &str) -> bool {
+    let mut words = text.split(['_', '/']);
+    Unit::parse(text).is_ok()
+        || !text.is_empty() && words.all(|word| WORDS_OF_UNITS.contains(&word))
+}
+
+/// `velocity_kmh` is a reading in a unit that is not known; `displacement_sensor_voltage_v` is a
+/// covariate.
+fn lacks_a_unit(plain: &str) -> bool {
+    KEYWORDS
+        .iter()
+        .filter_map(|keyword| plain.strip_prefix(keyword))
+        .any(|rest| match rest.strip_prefix('_') {
+            None => rest.is_empty(),
+            Some(unit) => !unit.replacen("_per_", "/", 1).contains('_'),
+        })
+}
+
+/// Units at the end of a covariate's name, as loggers and surveys write them.
+const CHANNEL_UNITS: [&str; 41] = [
+    "mm", "cm", "m", "in", "ft", "km", "c", "f", "k", "degc", "degf", "deg_c", "deg_f", "deg",
+    "m3_s", "m3_per_s", "l_s", "l_per_s", "cfs", "m_s", "m_per_s", "km_h", "km_per_h", "pa", "hpa",
+    "kpa", "mpa", "bar", "mbar", "psi", "kn", "percent", "pct", "v", "mv", "ma", "hz", "s", "w_m2",
+    "g", "ppm",
+];
+
+/// The longest known unit at a name's end: `mm_per_day` of `rain_mm_per_day`.
+pub(super) fn channel_unit(name: &str) -> Option<&str> {
+    let is_known = |unit: &&str| {
+        let plain = unit.to_ascii_lowercase();
+        CHANNEL_UNITS.contains(&plain.as_str()) || Unit::parse(&plain).is_ok()
+    };
+    let bracketed = name
+        .find(['[', '('])
+        .and_then(|at| in_brackets(&name[at..]));
+    let suffixes = name.match_indices('_').map(|(at, _)| &name[at + 1..]);
+    bracketed
+        .filter(is_known)
+        .or_else(|| suffixes.into_iter().find(is_known))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_says_benchmark_quantity_and_unit() {
+        let per_hour = Unit::parse("mm/h").unwrap();
+        let cases = [
+            ("displacement_mm", None, Measure::Reading(Unit::MM)),
+            ("velocity_mm_per_h", None, Measure::Reading(per_hour)),
+            (
+                "31-1930_displacement_mm",
+                Some("31-1930"),
+                Measure::Reading(Unit::MM),
+            ),
+            (
+                "a_b_velocity_mm_per_d",
+                Some("a_b"),
+                Measure::Reading(Unit::MM_PER_DAY),
+            ),
+            ("blkm_sigma_mm", Some("blkm"), Measure::Sigma(Unit::MM)),
+            ("A_Displacement_MM", Some("A"), Measure::Reading(Unit::MM)),
+        ];
+        for (name, id, measure) in cases {
+            assert_eq!(name_of(name), Name::Measure(id, measure), "{name}");
+        }
+    }
+
+    #[test]
+    fn every_other_name_is_a_channel_with_its_longest_unit() {
+        let cases = [
+            ("lake_level_m", Some("m")),
+            ("rain_mm_per_day", Some("mm_per_day")),
+            ("river_flow_cfs", Some("cfs")),
+            ("inflow_m3_s", Some("m3_s")),
+            ("air_temperature_max_f", Some("f")),
+            ("wind_velocity_m_per_s", Some("m_per_s")),
+            ("displacement_sensor_voltage_v", Some("v")),
+            ("humidity_percent", Some("percent")),
+            ("quality", None),
+            ("m", None),
+        ];
+        for (name, unit) in cases {
+            assert_eq!(name_of(name), Name::Channel(unit), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_reading_in_no_known_unit_is_refused_rather_than_taken_for_a_covariate() {
+        for name in ["displacement", "velocity_kmh", "velocity_m_per_s", "sigma"] {
+            assert_eq!(name_of(name), Name::WithoutUnit, "{name}");
+        }
+    }
+}

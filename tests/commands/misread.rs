@@ -1,0 +1,245 @@
+//! Files and configs that would be misread: what they state counts, and what contradicts them is said.
+
+use crate::office::{Office, plain, rows, site};
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+
+fn contains_all(said: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(said.contains(part), "no {part:?} in {said}");
+    }
+}
+
+/// All that `check` says.
+fn checked(office: &Office) -> String {
+    let (_, out, err) = office.say(&["check", "site.toml"]);
+    format!("{out}{err}")
+}
+
+#[test]
+fn a_unit_without_a_column_counts_before_the_one_in_the_columns_name() {
+    let more = "[[benchmark]]\nid = \"P1\"\nunit = \"m\"\n";
+    let config = site("slope.csv", more);
+    let office = Office::with(&[("slope.csv", &plain(40)), ("site.toml", &config)]);
+    let said = checked(&office);
+    contains_all(
+        &said,
+        &[
+            "P1_displacement_mm  benchmark P1, m",
+            "19.5 m",
+            "named as one in mm, and taken in m",
+        ],
+    );
+}
+
+#[test]
+fn a_unit_of_the_units_line_that_cannot_be_read_is_named_and_mm_is_not_proposed() {
+    let table = |unit: &str| {
+        let body = rows(40, |time, value| {
+            format!("\"{}\",{value}\n", time.strftime("%F %T"))
+        });
+        format!(
+            "\"TOA5\",\"a\",\"b\",\"c\",\"d\",\"e\",\"f\",\"g\"\n\"TIMESTAMP\",\"Ext1\"\n\"TS\",\"{unit}\"\n\"\",\"Smp\"\n{body}"
+        )
+    };
+    let office = Office::with(&[("a.dat", &table("furlongs"))]);
+    let args = ["init", "a.dat", "--time-zone", "UTC"];
+    let said = office.refused(2, &args);
+    contains_all(&said, &["\"furlongs\"", "Ext1=P1:displacement:UNIT"]);
+    let stated = [&args[..], &["--column", "Ext1=P1:displacement:mm"]].concat();
+    let (_, out, err) = office.say(&stated);
+    contains_all(
+        &format!("{out}{err}"),
+        &["the units line has \"furlongs\"", "taken in mm"],
+    );
+    for (unit, named) in [("inches", "in"), ("um", "um"), ("inches/day", "in_per_day")] {
+        let said = Office::with(&[("a.dat", &table(unit))]).refused(2, &args);
+        contains_all(&said, &[&format!(":{named}\"")]);
+    }
+}
+
+#[test]
+fn a_header_that_comes_again_without_the_column_of_a_benchmark_is_said() {
+    let head = |unit: &str| {
+        format!(
+            "\"TOA5\",\"a\",\"b\",\"c\",\"d\",\"e\",\"f\",\"g\"\n\"TIMESTAMP\",\"Ext1\"\n\"TS\",\"{unit}\"\n\"\",\"Smp\"\n"
+        )
+    };
+    let row = |time: jiff::civil::DateTime, value: f64| {
+        let again = if time.day() == 2 && time.hour() == 0 {
+            head("cm")
+        } else {
+            String::new()
+        };
+        format!("{again}\"{}\",{value}\n", time.strftime("%F %T"))
+    };
+    let text = format!("{}{}", head("mm"), rows(40, row));
+    let more =
+        "time_zone = \"UTC\"\n[[benchmark]]\nid = \"T\"\ncolumn = \"Ext1_mm\"\nunit = \"mm\"\n";
+    let config = site("a.dat", more).replace("\"csv\"", "\"toa5\"");
+    let office = Office::with(&[("a.dat", &text), ("site.toml", &config)]);
+    contains_all(
+        &checked(&office),
+        &["has no column \"Ext1_mm\", where the readings of benchmark \"T\" stood"],
+    );
+}
+
+#[test]
+fn a_clock_of_twelve_hours_is_asked_about_and_am_and_pm_may_stand_in_a_column() {
+    let without = rows(100, |time, value| {
+        format!("{},{value}\n", time.strftime("%F %I:%M"))
+    });
+    let text = format!("when,P1_displacement_mm\n{without}");
+    let office = Office::with(&[("slope.csv", &text)]);
+    let said = office.refused(2, &["init", "slope.csv", "--time-zone", "UTC"]);
+    contains_all(&said, &["no hour is over 12", "--time-format"]);
+
+    let with = rows(400, |time, value| {
+        format!("{},{value}\n", time.strftime("%m/%d/%Y,%I:%M,%p"))
+    });
+    let text = format!("Date,Time,AMPM,P1_displacement_mm\n{with}");
+    let office = Office::with(&[("slope.csv", &text)]);
+    let said = office.done(&["init", "slope.csv", "--time-zone", "UTC"]);
+    contains_all(
+        &said,
+        &[
+            "400 readings",
+            "first 2017-06-01T00:00:00Z",
+            "last  2017-06-17T15:00:00Z",
+        ],
+    );
+}
+
+#[test]
+fn the_zone_in_the_name_of_the_times_column_is_taken_and_a_contradiction_said() {
+    let text = rows(40, |time, value| {
+        format!("{time},{value}\n").replace('T', " ")
+    });
+    let text = format!("Time (UTC+1),P1_displacement_mm\n{text}");
+    let office = Office::with(&[("slope.csv", &text)]);
+    let said = office.done(&["init", "slope.csv"]);
+    contains_all(&said, &["first 2017-05-31T23:00:00Z", "Etc/GMT-1"]);
+    let (_, _, err) = office.say(&["init", "slope.csv", "--time-zone", "UTC", "--force"]);
+    contains_all(
+        &err,
+        &["has the zone Etc/GMT-1 in its name, and --time-zone is UTC"],
+    );
+}
+
+#[test]
+fn a_script_that_the_kernel_cannot_run_is_said_by_check_and_doctor() {
+    for (script, why) in [
+        ("echo hi\n", "names no interpreter"),
+        ("#!/bin/sh\r\necho hi\r\n", "lines end as on Windows"),
+    ] {
+        let config = site("slope.csv", "[[hook]]\nrun = [\"./hook.sh\"]\n");
+        let office = Office::with(&[
+            ("slope.csv", &plain(40)),
+            ("site.toml", &config),
+            ("hook.sh", script),
+        ]);
+        let executable = fs::Permissions::from_mode(0o755);
+        fs::set_permissions(office.path("hook.sh"), executable).unwrap();
+        contains_all(&checked(&office), &[why]);
+        let (_, out, err) = office.say(&["doctor", "site.toml"]);
+        contains_all(&format!("{out}{err}"), &[why]);
+    }
+}
+
+#[test]
+fn thresholds_that_are_exceeded_and_benchmarks_of_one_column_are_said() {
+    let more = "[[benchmark]]\nid = \"A\"\ncolumn = \"P1_displacement_mm\"\n\
+                [[benchmark]]\nid = \"B\"\ncolumn = \"P1_displacement_mm\"\n";
+    let text = plain(40);
+    let office = Office::with(&[
+        ("slope.csv", &text),
+        ("site.toml", &site("slope.csv", more)),
+    ]);
+    let said = checked(&office);
+    contains_all(
+        &said,
+        &["several [[benchmark]] (A, B) have column = \"P1_displacement_mm\""],
+    );
+    assert!(!said.contains("is the id right"), "{said}");
+    let more = "[alert]\n[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"12 mm\"\n";
+    let office = Office::with(&[
+        ("slope.csv", &text),
+        ("site.toml", &site("slope.csv", more)),
+    ]);
+    contains_all(
+        &checked(&office),
+        &["it has moved by 19.5 mm", "\"12 mm\" calls red"],
+    );
+}
+
+#[test]
+fn a_declared_reset_is_no_fall_and_a_contradicting_size_is_said() {
+    let text = rows(100, |time, value| {
+        let noise = f64::from(time.hour() % 3) * 0.2;
+        let value = if value < 30.0 { value } else { value - 35.0 };
+        format!("{time}Z,{:.2}\n", value + noise)
+    });
+    let text = format!("time,P1_displacement_mm\n{text}");
+    let of = |size: &str| {
+        let event = format!(
+            "[[event]]\ntime = \"2017-06-03T11:30:00Z\"\nbenchmark = \"P1\"\nkind = \"reset\"\n{size}"
+        );
+        let more = format!("[[benchmark]]\nid = \"P1\"\n{event}");
+        checked(&Office::with(&[
+            ("slope.csv", &text),
+            ("site.toml", &site("slope.csv", &more)),
+        ]))
+    };
+    for size in ["", "size = -35.0\nunit = \"mm\"\n"] {
+        let said = of(size);
+        assert!(!said.contains("suspicion"), "{said}");
+    }
+    for size in [
+        "size = 35.0\nunit = \"mm\"\n",
+        "size = -35.0\nunit = \"m\"\n",
+    ] {
+        contains_all(
+            &of(size),
+            &["the reset declared for 2017-06-03T11:30:00Z has a size of"],
+        );
+    }
+}
+
+#[test]
+fn check_says_how_rain_is_taken_and_where_it_is_a_total_of_each_day() {
+    let of = |rain: &dyn Fn(jiff::civil::DateTime) -> f64| {
+        let text = rows(200, |time, value| {
+            format!("{time}Z,{value},{}\n", rain(time))
+        });
+        let text = format!("time,P1_displacement_mm,rain_mm\n{text}");
+        Office::with(&[("slope.csv", &text)]).done(&["init", "slope.csv"])
+    };
+    let falling = of(&|time| f64::from(i32::from(time.hour()) * 7 % 5));
+    contains_all(&falling, &["rain as it falls: each value"]);
+    assert!(!falling.contains("a total of each day"), "{falling}");
+    let of_days = of(&|time| f64::from(time.hour() / 6));
+    contains_all(
+        &of_days,
+        &["it falls at 00:00:00 UTC alone, as a total of each day"],
+    );
+}
+
+#[test]
+fn a_header_without_rows_is_no_riddle_and_messages_may_change_their_unit() {
+    let office = Office::with(&[("slope.csv", "time,P1_displacement_mm\n")]);
+    let said = office.refused(2, &["init", "slope.csv"]);
+    contains_all(&said, &["a header and no row below it", "run init again"]);
+    let text = rows(40, |time, value| {
+        let (value, unit) = if value < 10.0 {
+            (value, "mm")
+        } else {
+            (value / 1e3, "m")
+        };
+        format!(
+            "{{\"benchmark\":\"P1\",\"time\":\"{time}Z\",\"value\":{value},\"unit\":\"{unit}\"}}\n"
+        )
+    });
+    let office = Office::with(&[("m.ndjson", &text)]);
+    let said = office.done(&["init", "m.ndjson"]);
+    contains_all(&said, &["40 readings", "19.5 mm"]);
+}
