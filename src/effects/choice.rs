@@ -126,8 +126,8 @@ impl Search<'_> {
         let share = self.options.held_out_share;
         block(self.problem, &one.fitted.terms, share)?;
         let slow = self.slow_load(base)?;
-        if one.term.is_jump_of_reading() && jumps_at_once(self.problem, &slow.fitted) {
-            // What acts between two readings is not slow: it follows the same jump.
+        if jumps_at_once(self.problem, &slow.fitted) {
+            // What moves the slope between two readings is not slow: it follows the jump that `one` is.
             return None;
         }
         let more = slow.gain - most;

@@ -14,6 +14,9 @@ use super::search::{Accepted, Refitted, Search};
 /// Of heat and melt, days.
 const DAILY: [f64; 2] = [1.0, 0.5];
 
+/// The share of what a tide explains beyond a daily cycle that waves which are no tide's explain as well.
+const UNEVEN: f64 = 0.5;
+
 /// Said where the day may be what comes and goes.
 pub(super) const REMARK: &str = "The motion comes and goes with the day of 24 hours, or with half of it: warmth, melt water and \
     the sun's own tides all do, and these readings cannot tell which it is. A record of the temperature can.";
@@ -59,7 +62,7 @@ impl Search<'_> {
         // Warmth and melt water come once a day: a wave of half a day by itself is theirs only where it is none of the moon's.
         let is_half = strongest(&daily, problem).is_some_and(|wave| wave > 0);
         if -less >= self.options.bic_margin || (is_half && !is_apart) {
-            return None;
+            return self.uneven_days_instead(base, one, -less);
         }
         self.is_daily = true;
         let by = if less >= 1.0 {
@@ -71,6 +74,39 @@ impl Search<'_> {
             "a daily cycle of 24 and 12 hours, as of warmth or melt water, explains the same{by}"
         ))
     }
+}
+
+impl Search<'_> {
+    /// Why a tide is not concluded though it explains `more` than a daily cycle: one that is stronger on some days than on others has waves
+    /// on either side of 24 and 12 hours, and those that mirror the moon's explain a good part of it too.
+    fn uneven_days_instead(&mut self, base: &Fitted, one: &Refitted, more: f64) -> Option<String> {
+        let (problem, kind) = (self.problem, one.term.kind);
+        let lunar = kind.definition().wave_periods.iter();
+        let lunar = lunar.filter(|period| !is_daily(**period, problem.span()));
+        let mirrored: Vec<f64> = DAILY
+            .into_iter()
+            .chain(lunar.map(|period| mirror(*period)))
+            .collect();
+        let daily = self.refitted(base, &candidates::waves(problem, kind, &DAILY))?;
+        let uneven = self.refitted(base, &candidates::waves(problem, kind, &mirrored))?;
+        let is_uneven = more > 0.0 && uneven.gain - daily.gain >= UNEVEN * more;
+        is_uneven.then(|| {
+            self.is_daily = true;
+            "a daily cycle that is stronger on some days than on others looks the same".to_owned()
+        })
+    }
+}
+
+/// The period as far on the other side of the nearest of [`DAILY`] in cycles a day.
+fn mirror(period: f64) -> f64 {
+    let cycles = 1.0 / period;
+    let solar = DAILY.map(|own| 1.0 / own);
+    let nearest = if (cycles - solar[0]).abs() < (cycles - solar[1]).abs() {
+        solar[0]
+    } else {
+        solar[1]
+    };
+    1.0 / (2.0 * nearest - cycles)
 }
 
 /// Which of the waves of the newest term is the strongest.

@@ -1,8 +1,9 @@
 //! What an effect must show before it is accepted: sign, memory, bounds, and a later block that it helps to predict.
 
 use super::act::Act;
+use super::definition::Support;
 use super::fresh::{best_of_starts, fresh_starts};
-use super::kind::Form;
+use super::kind::{Form, Kind};
 use super::noise::{Memory, Noise, Whitener};
 use super::problem::{Problem, slips};
 use super::quantiles::upper_median;
@@ -38,6 +39,11 @@ const MOVES: u32 = 8;
 /// A jump that took longer than this, days, may be slip.
 const LONGEST_JUMP_DAYS: f64 = 3.0;
 
+/// The error extrapolated over all of the block carries the law's own drift: of what independent data support it may grow by the
+/// first factor at most. A tide comes back to where it was and cannot drift: what grows there is the law's.
+const MOST_EXTRAPOLATED: f64 = 1.2;
+const MOST_OF_A_TIDE: f64 = 10.0;
+
 /// Names of what only ever loosens a slope: more of it, more motion.
 const LOOSENING: [&str; 9] = [
     "rain",
@@ -50,6 +56,16 @@ const LOOSENING: [&str; 9] = [
     "melt",
     "snowmelt",
 ];
+
+/// By what factor the held-out error may grow where it is extrapolated over all of the block; what only the shape of the readings
+/// supports may change the law, and with it no error may grow.
+pub(super) fn most_extrapolated(kind: Kind) -> f64 {
+    match kind.definition().support {
+        Support::Astronomy => MOST_OF_A_TIDE,
+        Support::Nothing => 1.0,
+        Support::Covariate | Support::Shape => MOST_EXTRAPOLATED,
+    }
+}
 
 /// Why `fitted` (the last of its terms being new) is not what the physics allow; `None` if it is.
 pub(super) fn objection(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) -> Option<String> {

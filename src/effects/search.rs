@@ -6,7 +6,9 @@ use super::definition::{Support, Trying};
 use super::explanation::Candidate;
 use super::fresh::best_of_starts;
 use super::inverted::inverted_starts;
-use super::judge::{Compared, HeldOut, StepErrors, block, held_out, objection, step_errors};
+use super::judge::{
+    Compared, HeldOut, StepErrors, block, held_out, most_extrapolated, objection, step_errors,
+};
 use super::kind::Kind;
 use super::noise::{Memory, Whitener};
 use super::options::Options;
@@ -26,11 +28,6 @@ pub(super) const SIGNIFICANT: f64 = 0.01;
 /// the errors, by more than the second factor.
 const WORSE: f64 = 2.0;
 const WORSE_STEPS: f64 = 1.005;
-/// The error extrapolated over all of the block carries the law's own drift: of what independent data support it may grow by the
-/// first factor at most. A tide comes back to where it was and cannot drift: what grows there is the law's.
-const MOST_EXTRAPOLATED: f64 = 1.2;
-const MOST_OF_A_TIDE: f64 = 10.0;
-
 /// A held-out error that is so many times as large is no figure.
 const RUNS_AWAY: f64 = 1000.0;
 
@@ -495,16 +492,6 @@ impl Search<'_> {
 fn share_grown_to(problem: &Problem, before: f64, after: f64) -> Option<f64> {
     let is_worse = after > WORSE_STEPS * before && StepErrors::is_a_figure(problem, before);
     is_worse.then(|| 100.0 * after / before.max(1e-300))
-}
-
-/// By what factor the held-out error may grow where it is extrapolated over all of the block; what only the shape of the readings
-/// supports may change the law, and with it no error may grow.
-fn most_extrapolated(kind: Kind) -> f64 {
-    match kind.definition().support {
-        Support::Astronomy => MOST_OF_A_TIDE,
-        Support::Nothing => 1.0,
-        Support::Covariate | Support::Shape => MOST_EXTRAPOLATED,
-    }
 }
 
 #[cfg(test)]
