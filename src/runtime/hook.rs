@@ -245,9 +245,10 @@ impl Alert {
         let benchmark = self.event.benchmark.as_ref();
         let count = self.many.as_ref().map_or(1, |many| many.members.len());
         let optional_time = self.failure_time.map(|time| time.to_string());
-        let (rule, text) = match &self.event.kind {
-            EventKind::Alert { rule, text, .. } => (rule.to_string(), one_line(text)),
-            _ => (String::new(), String::new()),
+        let (rule, text) = if let EventKind::Alert { rule, text, .. } = &self.event.kind {
+            (rule.clone(), one_line(text))
+        } else {
+            (String::new(), String::new())
         };
         [
             ("SLIPWATCH_EVENT", self.event.kind.name().to_owned()),
