@@ -426,6 +426,32 @@ mod tests {
     }
 
     #[test]
+    fn velocities_have_the_error_of_their_scatter_and_none_where_it_is_a_small_share_of_them() {
+        let of = |noise: f64, velocity: fn(f64) -> f64| {
+            let values = (0..300_u32).map(|hour| Observation {
+                t_days: f64::from(hour) / 24.0,
+                value: velocity(f64::from(hour))
+                    + noise * (f64::from(hour * 37 % 101) / 50.0 - 1.0),
+                sigma: None,
+            });
+            let read = Observations {
+                quantity: Quantity::Velocity,
+                averaging_days: 0.0,
+                values: values.collect(),
+            };
+            read.rates(0..300, RateOptions::default())[95].sigma
+        };
+        let steady = |_| 2.0;
+        let fails = |hour: f64| 400.0 / (301.0 - hour);
+        // Uniform within 3: a standard deviation of 1.7.
+        for velocity in [steady, fails] {
+            let sigma = of(3.0, velocity);
+            assert!((1.0..=3.0).contains(&sigma), "{sigma}");
+            assert_eq!(of(0.05, velocity).to_bits(), 0.0_f64.to_bits());
+        }
+    }
+
+    #[test]
     fn creep_under_the_noise_is_merged_until_it_stands_clear() {
         let noise = [0.6, -0.9, 0.2, 1.1, -0.4, -0.7, 0.8, -0.1];
         let values: Vec<(f64, f64)> = (0..400_u32)

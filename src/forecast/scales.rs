@@ -519,6 +519,23 @@ mod tests {
     }
 
     #[test]
+    fn a_past_event_counts_less_by_degrees_as_more_of_its_kind_are_seen() {
+        let rough = |t: f64| t + 0.3 * (7.3 * t).sin();
+        let share = |others: f64| {
+            let jumps = move |t: f64| {
+                let of = |at: f64, by: f64| if t >= at { by } else { 0.0 };
+                rough(t) + of(60.0, 50.0) + of(20.0, others) + of(40.0, others) + of(90.0, others)
+            };
+            let scales = Scales::of(&readings(1.0, 120, jumps)).unwrap();
+            scales.disturbed.map_or(0.0, |event| event.share)
+        };
+        let shares = [0.0, 4.0, 6.0, 8.0, 10.0, 14.0, 20.0, 40.0].map(share);
+        assert!(shares[0] > 0.99 && shares[7] < 0.01, "{shares:?}");
+        let gradual = shares.iter().filter(|share| (0.05..=0.95).contains(*share));
+        assert!(gradual.count() >= 1, "{shares:?}");
+    }
+
+    #[test]
     fn velocities_add_up_to_the_motion_that_they_are_of() {
         let mut velocities = readings(0.5, 200, |_| 7.0);
         velocities.quantity = Quantity::Velocity;

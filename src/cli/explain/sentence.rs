@@ -23,6 +23,10 @@ pub(super) fn verdict(explanation: &Explanation) -> String {
     let has_too_few = explanation.remarks.iter().any(|one| one == TOO_FEW);
     if is_declared {
         format!("{benchmark}: nothing of what was declared stands{structure}")
+    } else if effect.effect == Kind::UNEXPLAINED && explanation.error.fit.before.is_none() {
+        format!(
+            "{benchmark}: nothing can be said of what the law lacks: it was not fitted to these readings"
+        )
     } else if effect.effect == Kind::UNEXPLAINED {
         format!(
             "{benchmark}: unexplained: the law lacks something here, and no effect that was tried explains it{structure}"

@@ -207,20 +207,18 @@ fn text(
             format!("; velocity {} mm/day", figure(velocity, 3))
         });
     let grounds = grounds(policy, evidence, &change.rule);
-    let chance = |name: &str, chance: Option<f64>, span: SignedDuration| {
+    let chance = |name: &str, chance: Option<f64>, span: &str| {
         chance.map_or_else(String::new, |chance| {
             let chance = chance_in_words(chance);
-            format!("; chance {chance} within {name} ({})", hours_in_words(span))
+            format!("; chance {chance} within {name} ({span})")
         })
     };
-    let outlook = if ahead.orange < policy.outlook {
-        format!(
-            "five times the record's length, which is shorter than the outlook of {},",
-            hours_in_words(policy.outlook)
-        )
-    } else {
-        "the outlook".to_owned()
-    };
+    let (mut outlook, mut ahead_of_outlook) = ("the outlook", hours_in_words(ahead.orange));
+    if ahead.orange < policy.outlook {
+        outlook = "five times the record's length";
+        ahead_of_outlook += ", shorter than the outlook of ";
+        ahead_of_outlook += &hours_in_words(policy.outlook);
+    }
     format!(
         "benchmark {}: {}{verb} ({}){grounds}{}{}{velocity}; the critical velocity is {} mm/day",
         record.benchmark(),
@@ -232,9 +230,9 @@ fn text(
                 policy.red_within_in_words()
             ),
             evidence.chance_for_red,
-            ahead.red
+            &hours_in_words(ahead.red)
         ),
-        chance(&outlook, evidence.chance_within_outlook, ahead.orange),
+        chance(outlook, evidence.chance_within_outlook, &ahead_of_outlook),
         shortest(policy.critical_velocity_mm_per_day),
     )
 }

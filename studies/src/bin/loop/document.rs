@@ -35,13 +35,15 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
    everything that is tried gains alike; an event lies between two readings. The best one enters, and the search begins again (*after*); but
    where the law that was found with it is the better one without it too, the law before was a poor fit, nothing enters, and the search begins
    again from that law. What entered early leaves again where the BIC rises by less than 10 without it.
-4. An effect is accepted only if the BIC falls by 10 or more, the sign is one that the ground allows, its memory is short against the
+4. An effect is accepted only if the BIC falls by 10 or more (by 20 where only the shape of the readings supports it, or it happened at a time, and the noise does not
+   remember: a random walk so small that the law takes it up looks like either), the sign is one that the ground allows, its memory is short against the
    record, a search on 399 surrogates without any effect gains as much in fewer than 1 % of cases, and a later block, held out, is predicted
    no worse by the effects as they were learned before it. That is judged by innovations, each reading of the block predicted from
    those before it, under a law that is fitted to all readings with the effect and without: where the law itself drifts is
    not in question. An effect that only the shape of the readings supports (no channel, no tide, no season) may have changed the law, and is
    judged with the law too as it was learned before the block. Extrapolated over the whole block, such an effect may not be
-   worse at all, and another by a fifth at most; a tide, which comes back to where it was and cannot drift, by ten times at most:
+   worse at all, and another by a fifth at most (a covariate is not judged so where the law itself runs away within the block: an error larger than all that the
+   readings range over is no figure); a tide, which comes back to where it was and cannot drift, by ten times at most:
    the rest is the law's. All effects together may predict the block no worse than the law without any. A tide must gain as much more than a daily cycle of 24 and 12 hours,
    which warmth and melt water have. What is no tide and not of the reading must also account for the readings as well, within the margin, as a load
    does that changes over a while, or comes and goes, and that nothing measures; a rise over several readings is no reset. Everything
