@@ -2,7 +2,8 @@
 //!
 //! A forecast that changes its mind does not lower a level. What does: the slope has slowed to half the
 //! highest velocity seen at this level, without gaining, for a whole evacuation time in which the evidence
-//! called for less; or it has held a velocity under the critical one, without gaining, for the stated time. What
+//! called for less; or it has been seen to hold a velocity under the critical one, without gaining, for the stated time, and is no faster
+//! than when the level was called, or nothing is called any more. What
 //! lies within the error of a velocity is no gain, and motion that never stood out of it has not to slow down.
 
 use super::evidence::AlertEvidence;
@@ -229,6 +230,9 @@ impl Latch {
         // What is no larger than its error is no peak: readings that are spoilt would raise it, and then seem to slow down.
         if velocity > CLEAR * error {
             self.peak_velocity = self.peak_velocity.max(velocity);
+            if self.first_velocity <= 0.0 && self.level > Level::Green {
+                self.first_velocity = velocity;
+            }
         }
         // Motion that never stood out of its error has not to slow down.
         let is_slow = self.has_slowed_to(velocity, error) || self.peak_velocity <= 0.0;

@@ -39,7 +39,8 @@ pub(super) fn distinct(
         .into_iter()
         .partition(|channel| faulty.contains(&channel.name));
     for channel in first.into_iter().chain(second) {
-        let mut others = kept.iter().filter(|_| !is_of_the_calendar(&channel));
+        let is_date = is_of_the_calendar(&channel);
+        let mut others = kept.iter().filter(|_| !is_date);
         match others.find(|known| same_values(known, &channel)) {
             Some(known) => copies.push(ChannelCopy {
                 of: known.name.clone(),

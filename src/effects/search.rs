@@ -374,7 +374,7 @@ impl Search<'_> {
             let reason = if ratio <= RUNS_AWAY {
                 format!("the held-out error grows to {:.0} %", 100.0 * ratio)
             } else {
-                "the law with it runs away in the held-out readings".to_owned()
+                "with it the held-out error is over a thousand times as large".to_owned()
             };
             return (
                 Some(ratio).filter(|ratio| ratio.is_finite()),

@@ -237,7 +237,7 @@ pub(crate) fn displacement_sigma(values: &[Observation]) -> f64 {
         .max(least)
 }
 
-/// The same of one velocity reading, mm/day; 0 where the readings scatter no more than motion does. Motion that is fast is rough: only the
+/// The same of one velocity reading, mm/day; 0 where the readings scatter no more than motion does, and with fewer than eight. Motion that is fast is rough: only the
 /// slower half shows the instrument, and of that not what is a small share of its velocity, for which the law's own scatter accounts. (How far
 /// the middle one of three stands from its neighbours does not depend on the mean of the three.)
 pub(crate) fn velocity_sigma(values: &[Observation]) -> f64 {

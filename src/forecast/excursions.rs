@@ -14,8 +14,9 @@ const ALIKE: f64 = 0.5;
 /// Fewer readings show nothing.
 const FEWEST: usize = 10;
 
-/// The observations without those that left the course and came back. The newest reading always stays: it may be the first of a motion.
-pub(super) fn without_excursions(observations: &Observations) -> Cow<'_, Observations> {
+/// The observations without those that left the course and came back for two readings at least. The newest ones always stay: they may be the
+/// first of a motion.
+pub(crate) fn without_excursions(observations: &Observations) -> Cow<'_, Observations> {
     let values = &observations.values;
     if observations.quantity != Quantity::Displacement || values.len() < FEWEST {
         return Cow::Borrowed(observations);
@@ -40,7 +41,7 @@ pub(super) fn without_excursions(observations: &Observations) -> Cow<'_, Observa
     })
 }
 
-/// How many of the first of `later` left the straight line from `before` to the one after them: none or a few, and never all.
+/// How many of the first of `later` left the straight line from `before` to the one after them: none or a few, and two at least are left.
 fn excursion(before: &Observation, later: &[Observation], away: f64) -> usize {
     if (later[0].value - before.value).abs() <= away {
         return 0;
@@ -56,10 +57,12 @@ fn excursion(before: &Observation, later: &[Observation], away: f64) -> usize {
             .map(off)
             .fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
         let share = |one: &Observation| off(one) / farthest;
+        // One reading that is back may be the wrong one: the next has to be back as well.
         farthest.abs() > away.max(moved.abs())
             && later[..*count].iter().all(|one| share(one) >= ALIKE)
+            && share(&later[*count + 1]).abs() < ALIKE
     };
-    let most = MOST.min(later.len().saturating_sub(1));
+    let most = MOST.min(later.len().saturating_sub(2));
     (1..=most).find(comes_back).unwrap_or(0)
 }
 
@@ -92,6 +95,14 @@ mod tests {
         assert_eq!(days_left_out(&within(30..36, 400.0)), Vec::<u32>::new());
         assert_eq!(days_left_out(&within(30..60, 400.0)), Vec::<u32>::new());
         assert_eq!(days_left_out(&within(30..60, -400.0)), Vec::<u32>::new());
+        assert_eq!(days_left_out(&within(57..58, 400.0)), [57]);
+        assert_eq!(days_left_out(&within(58..59, 400.0)), Vec::<u32>::new());
+        // A slip of which the third reading is wrong.
+        let slip = creeping(|day| match day {
+            30 | 32.. => 90.0,
+            _ => 0.0,
+        });
+        assert_eq!(days_left_out(&slip), [31]);
         assert_eq!(days_left_out(&within(59..60, 400.0)), Vec::<u32>::new());
         assert_eq!(days_left_out(&within(0..1, 400.0)), Vec::<u32>::new());
     }

@@ -20,6 +20,7 @@ mod together;
 pub use collapse::{Collapse, Indicators};
 pub use dependence::Dependence;
 pub use evidence::RATE_PER_YEAR;
+pub(crate) use excursions::without_excursions;
 pub use line::InverseVelocityLine;
 pub use members::Members;
 pub use network::{INPUTS, Network, UNITS};

@@ -167,7 +167,12 @@ fn from_the_first(observations: &Observations) -> Option<f64> {
             let each = values
                 .iter()
                 .map(|one| one.value - FIRST_ERRORS * one.sigma.unwrap_or(0.0));
-            each.fold(f64::INFINITY, f64::min)
+            let (least, most) = each
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), one| {
+                    (low.min(one), high.max(one))
+                });
+            // What scatters by more than its size may be noise.
+            if most - least < least { least } else { 0.0 }
         }
     };
     (by_each > 0.0).then_some(by_each)

@@ -31,6 +31,8 @@ const SMALL_STEP_MM: f64 = 0.02;
 /// Given to more decimals than that, they may be in m where two in a row differ by no more than this: no instrument on a slope
 /// resolves it from hour to hour.
 const UNRESOLVED_MM: f64 = 5e-4;
+/// Of the values so many may be wrong on either side.
+const WRONG: usize = 8;
 /// A slope that moved by more m than this may be in mm.
 const LARGE_M: f64 = 100.0;
 /// A suspicion of another unit goes on until a figure is so many times beyond where it begins: readings about there would raise and
@@ -194,16 +196,21 @@ pub fn may_still_have_another_scale(values: &[f64], unit: &str) -> bool {
     }
 }
 
-/// Whether these values, but for marks of no value, span more than readings in metres that are taken for `unit` would: as few of them
-/// are looked at as show it.
+/// Whether these values span more than readings in metres that are taken for `unit` would, several of them on either side: a few wrong
+/// ones are no motion.
 pub fn have_moved(values: impl IntoIterator<Item = f64>, unit: &str) -> bool {
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    let values = values.into_iter().filter(|value| !is_mark(*value));
-    unit == "mm"
-        && values.into_iter().any(|value| {
-            (low, high) = (low.min(value), high.max(value));
-            high - low >= SMALL_MM
-        })
+    let mut values: Vec<f64> = values
+        .into_iter()
+        .filter(|value| !is_mark(*value))
+        .collect();
+    if unit != "mm" || values.len() <= 2 * WRONG {
+        return false;
+    }
+    let last = values.len() - 1 - WRONG;
+    let (_, low, _) = values.select_nth_unstable_by(WRONG, f64::total_cmp);
+    let low = *low;
+    let (_, high, _) = values.select_nth_unstable_by(last, f64::total_cmp);
+    *high - low >= SMALL_MM
 }
 
 fn are_in_thousandths<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {

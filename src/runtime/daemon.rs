@@ -17,7 +17,7 @@ use super::shutdown::Shutdown;
 use super::site::{Site, announce_ends};
 use super::sources::Sources;
 use super::tail::{Arrival, ArrivalBatch};
-use crate::config::Config;
+use crate::config::{Config, HookConfig};
 use crate::monitor::Input;
 use crate::reading::Timestamp;
 use crate::store::{Position, Store, StoreError, Verified};
@@ -81,6 +81,8 @@ pub(super) fn dispatcher(
     faults: &ServiceFaults,
 ) -> Dispatcher {
     sandbox::announce(&config.hooks);
+    let names: Vec<String> = config.hooks.iter().map(HookConfig::name).collect();
+    faults.keep_hooks(&names);
     let delivered = Delivered::of(Arc::clone(store)).reporting(faults);
     Dispatcher::start(&config.hooks, &Retry::default(), delivered)
 }

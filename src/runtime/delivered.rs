@@ -62,19 +62,16 @@ impl Delivered {
         }
     }
 
-    /// `hook` has not taken `alert` in so many attempts; the last of them came to `how`.
-    pub(super) fn fails(&self, hook: &str, alert: &Alert, attempts: u32, how: &str) {
+    /// `hook` has not taken `alert`; `how` says after how many attempts, and why.
+    pub(super) fn fails(&self, hook: &str, alert: &Alert, how: &str) {
         let (level, state) = (alert.level.name(), state_name(alert.state));
         let place = alert.event.benchmark.as_ref();
         let place = place.map_or("the site".to_owned(), ToString::to_string);
-        let plural = if attempts == 1 { "" } else { "s" };
-        let text = format!(
-            "hook {hook} has not taken {level} ({state}) of {place} in {attempts} attempt{plural}: {how}"
-        );
+        let text = format!("{level} ({state}) of {place} was not taken by {how}");
         self.faults.lasts(FaultPlace::of_hook(hook), &text);
     }
 
-    /// `hook` takes what it gets, or is no hook any more.
+    /// `hook` takes what it gets.
     pub(super) fn fails_no_more(&self, hook: &str) {
         self.faults.is_over(&FaultPlace::of_hook(hook));
     }

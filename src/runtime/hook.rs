@@ -246,7 +246,7 @@ impl Alert {
         let count = self.many.as_ref().map_or(1, |many| many.members.len());
         let optional_time = self.failure_time.map(|time| time.to_string());
         let (rule, text) = if let EventKind::Alert { rule, text, .. } = &self.event.kind {
-            (rule.clone(), one_line(text))
+            (rule.clone(), text.clone())
         } else {
             (String::new(), String::new())
         };
@@ -299,12 +299,6 @@ impl Alert {
         body.push(b'\n');
         Ok(body)
     }
-}
-
-/// Without what ends a line or a C string.
-fn one_line(text: &str) -> String {
-    let plain = |letter: char| if letter.is_control() { ' ' } else { letter };
-    text.chars().map(plain).collect()
 }
 
 /// The word in `SLIPWATCH_STATE`.

@@ -32,14 +32,14 @@ pub enum ServiceFaultKind {
     BrokerUnreachable,
     /// Subscribe at a broker.
     SubscriptionRefused,
+    /// Have an alert taken by a hook.
+    HookFailing,
     /// List a folder.
     FolderUnreadable,
     /// Read a file.
     FileUnreadable,
     /// Make anything of a file, until it is replaced.
     FileRefused,
-    /// Have an alert taken by a hook.
-    HookFailing,
 }
 
 impl ServiceFaultKind {
@@ -157,6 +157,13 @@ impl ServiceFaults {
         for (place, text) in now {
             self.lasts(place, &text);
         }
+    }
+
+    /// Of hooks these remain, and no others: those that the config has from here on.
+    pub(super) fn keep_hooks(&self, names: &[String]) {
+        self.locked().retain(|place, _| {
+            place.kind != ServiceFaultKind::HookFailing || names.contains(&place.what)
+        });
     }
 
     /// Those of sources are over: the sources are others from here on.

@@ -76,7 +76,7 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
             Explained::None => format!("Not explained: structure is left in the residual{left}."),
         });
         if explanation.verdict.effect == Kind::CORRELATED_NOISE {
-            // What remembers may be the instrument, and may be motion that no effect that was tried makes.
+            // Correlated noise may be the instrument's, and may be motion that no effect that was tried makes.
             said.push(
                 "Whether the instrument makes it or the slope, these readings do not show."
                     .to_owned(),

@@ -7,7 +7,7 @@ use jiff::tz::TimeZone;
 
 /// Fewer times show nothing.
 const FEWEST: usize = 10;
-/// Of the steps from one time to the next, one in so many goes back or nowhere where a clock shows each hour twice.
+/// Of the steps from one time to the next, one in so many goes back where a clock shows each hour twice.
 const ONE_IN: usize = 20;
 
 /// What is wrong with times on the logger's clock, taken as UTC, of which no hour is over 12 and that are in no order; `pattern`: how
@@ -23,10 +23,11 @@ pub(super) fn of_twelve_hours(times: &[Timestamp], pattern: &str) -> Option<Stri
     let steps = || times.windows(2).map(|pair| pair[1].cmp(&pair[0]));
     let back = steps().filter(|step| step.is_lt()).count();
     let on = steps().filter(|step| step.is_gt()).count();
-    let odd = times.len() - 1 - back.max(on);
+    // Rows of several points have one time.
+    let odd = back.min(on);
     (ONE_IN * odd >= times.len()).then(|| {
         format!(
-            "no hour is over 12 and none is 0, and {odd} times repeat or go back: a clock of 12 hours without AM and PM shows each hour twice a \
+            "no hour is over 12 and none is 0, and {odd} times go back: a clock of 12 hours without AM and PM shows each hour twice a \
              day. Let the logger write 24 hours, or AM and PM; where the hours are right as they stand, give --time-format {pattern:?}"
         )
     })
@@ -45,7 +46,7 @@ pub(super) fn zone_in_name(name: &str) -> Option<TimeZone> {
         .chars()
         .take_while(|one| one.is_ascii_digit() || "+-:".contains(*one))
         .collect();
-    let is_end = !rest[offset.len()..].starts_with(|one: char| one.is_alphanumeric());
+    let is_end = !rest[offset.len()..].starts_with(|one: char| one.is_alphanumeric() || one == '_');
     if is_within || !is_end {
         return None;
     }

@@ -333,8 +333,16 @@ fn in_order(formats: Vec<TimeFormat>, cells: &[String], decimal: DecimalMark) ->
     let goes_one_way = |format: &&TimeFormat| {
         let times = instants(cells, format, decimal);
         let steps = || times.windows(2).map(|pair| pair[1].duration_since(pair[0]));
-        // Clocks are put back, and rows of one day change places.
-        !(steps().any(|step| step > DISORDER) && steps().any(|step| step < -DISORDER))
+        let back = steps().filter(|step| step.is_negative()).count();
+        let on = steps().filter(|step| step.is_positive()).count();
+        // Clocks are put back, and rows of one day change places: but against most of the steps none is long.
+        !steps().any(|step| {
+            if on >= back {
+                step < -DISORDER
+            } else {
+                step > DISORDER
+            }
+        })
     };
     let ordered: Vec<TimeFormat> = formats.iter().filter(goes_one_way).cloned().collect();
     if ordered.is_empty() { formats } else { ordered }

@@ -1,6 +1,6 @@
 //! Values that from one row on are in another unit: all of them so many times as large.
 
-use super::trace::Trace;
+use super::trace::{Trace, resolution};
 use crate::effects::quantiles::median;
 
 /// Between mm, cm, m and km, and between them and inches and feet.
@@ -41,7 +41,7 @@ struct SideLine {
 }
 
 impl SideLine {
-    /// Through (days from the boundary, value); `None` with fewer than three.
+    /// Through (days from the boundary, value); `None` with fewer than [`FEWEST`].
     fn through(points: &[(f64, f64)]) -> Option<Self> {
         let n = points.len() as f64;
         if points.len() < FEWEST {
@@ -122,6 +122,8 @@ fn slip_at(trace: &Trace, from: usize) -> Option<UnitSlip> {
     let before = SideLine::through(&points(from.saturating_sub(BESIDE)..from, 1.0))?;
     let later = from..(from + BESIDE).min(trace.len());
     let jump = (trace.values[from] - trace.values[from - 1]).abs();
+    // Readings that do not move by their resolution say nothing of a line.
+    let finest = resolution(&trace.values);
     // A few wrong values are no change of the unit: the others step as before.
     let usual_step = |rows: std::ops::Range<usize>| {
         let steps = trace.values[rows].windows(2);
@@ -137,6 +139,7 @@ fn slip_at(trace: &Trace, from: usize) -> Option<UnitSlip> {
     let mut fitting = both.filter_map(|times| {
         let after = SideLine::through(&points(later.clone(), times))?;
         let error = before.level_error.hypot(after.level_error);
+        let is_known = before.scatter > 0.0 && after.scatter > 0.0 && error > 0.1 * finest;
         let off = (before.level - after.level).abs();
         let (low, high) = (
             before.scatter * times.min(1.0),
@@ -151,7 +154,7 @@ fn slip_at(trace: &Trace, from: usize) -> Option<UnitSlip> {
             differ <= MEET * slope_error || is_alike(before.slope, after.slope, SLOPES_ALIKE);
         let scatter = is_alike(before.scatter, after.scatter, ALIKE);
         let steps = is_alike(step_before, step_after / times, ALIKE);
-        let fits = meets && slopes && scatter && steps;
+        let fits = is_known && meets && slopes && scatter && steps;
         fits.then_some((off / error, UnitSlip { from, times }))
     });
     let first = fitting.next()?;

@@ -83,7 +83,7 @@ impl FitChanges {
                 .law
                 .and_then(|law| drift::expected_by_the_law(&law, recent(&outlook.rates), now));
             // A slope that moves backwards has no inverse velocity that meets zero.
-            let is_forward = settled(&outlook.rates).is_none_or(|velocity| velocity > 0.0);
+            let is_forward = settled(&outlook.rates).is_none_or(|velocity| velocity >= 0.0);
             if moved.to_days < moved.from_days && is_forward {
                 causes.push(AlertCause::InterceptDriftingIn);
             }

@@ -130,7 +130,6 @@ impl Worker {
             }
             while self.running.len() < MOST_AT_ONCE && self.start_next(open) {}
             if !open && self.running.is_empty() {
-                locked(&self.delivered).fails_no_more(&self.hook.name());
                 return self.lost;
             }
             let due = self.next_due();
@@ -291,7 +290,14 @@ impl Worker {
         match outcome {
             Some(HookOutcome::Done) => delivered.fails_no_more(&hook),
             Some(failed) => {
-                delivered.fails(&hook, &waiting.alert, waiting.attempt, &failed.in_words());
+                let how = format!(
+                    "hook {} in {} attempt{}: {}",
+                    self.hook.short_name(),
+                    waiting.attempt,
+                    if waiting.attempt == 1 { "" } else { "s" },
+                    failed.in_words()
+                );
+                delivered.fails(&hook, &waiting.alert, &how);
             }
             None => {}
         }

@@ -55,7 +55,9 @@ impl PreviewCovariate {
                 "{taken}. But it falls at {time} UTC alone, as a total of each day does: let the logger write what falls between its values, or a \
                  total that is not set back each day"
             ),
-            None => format!("{taken}; a total of a day, or of the last 24 h, is another matter"),
+            None => format!(
+                "{taken}; a total of a day, or of the last 24 h, would be counted several times"
+            ),
         }
     }
 

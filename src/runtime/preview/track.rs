@@ -241,14 +241,13 @@ impl PreviewTrack {
         if old <= OLD_DAYS && span <= LONG_DAYS {
             return None;
         }
-        let span = if span > LONG_DAYS {
-            format!(", and the readings go over {} years", span / 365)
+        let what = if old > OLD_DAYS {
+            format!("the newest reading is {old} days old: if newer ones are in the files")
         } else {
-            String::new()
+            format!("the readings go over {} years: if they do not", span / 365)
         };
         Some(format!(
-            "the newest reading is {old} days old{span}: if newer ones are in the files, their dates are written in another way: set time_format \
-             (--time-format)"
+            "{what}, their dates are written in another way: set time_format (--time-format)"
         ))
     }
 

@@ -42,8 +42,8 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
    those before it, under a law that is fitted to all readings with the effect and without: where the law itself drifts is
    not in question. An effect that only the shape of the readings supports (no channel, no tide, no season) may have changed the law, and is
    judged with the law too as it was learned before the block. Extrapolated over the whole block, such an effect may not be
-   worse at all, and another by a fifth at most (a covariate is not judged so where the law itself runs away within the block: an error larger than all that the
-   readings range over is no figure); a tide, which comes back to where it was and cannot drift, by ten times at most:
+   worse at all, and another by a fifth at most (a covariate is not judged so where the error with it exceeds all that the
+   readings range over: the law itself has failed within the block); a tide, which comes back to where it was and cannot drift, by ten times at most:
    the rest is the law's. All effects together may predict the block no worse than the law without any. A tide must gain as much more than a daily cycle of 24 and 12 hours,
    which warmth and melt water have. What is no tide and not of the reading must also account for the readings as well, within the margin, as a load
    does that changes over a while, or comes and goes, and that nothing measures; a rise over several readings is no reset. Everything
