@@ -96,7 +96,14 @@ mod tests {
             none.starts_with("BLKM: the residual cannot be distinguished from noise"),
             "{none}"
         );
-        let unexplained = text(&bare(Kind::UNEXPLAINED));
+        let mut fitted = bare(Kind::UNEXPLAINED);
+        let not_fitted = text(&fitted);
+        assert!(
+            not_fitted.starts_with("BLKM: nothing can be said"),
+            "{not_fitted}"
+        );
+        fitted.error.fit.before = Some(3.0);
+        let unexplained = text(&fitted);
         assert!(
             unexplained.starts_with("BLKM: unexplained"),
             "{unexplained}"

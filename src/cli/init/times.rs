@@ -333,8 +333,8 @@ fn in_order(formats: Vec<TimeFormat>, cells: &[String], decimal: DecimalMark) ->
     let goes_one_way = |format: &&TimeFormat| {
         let times = instants(cells, format, decimal);
         let steps = || times.windows(2).map(|pair| pair[1].duration_since(pair[0]));
-        let back = steps().filter(|step| step.is_negative()).count();
-        let on = steps().filter(|step| step.is_positive()).count();
+        let back = steps().filter(SignedDuration::is_negative).count();
+        let on = steps().filter(SignedDuration::is_positive).count();
         // Clocks are put back, and rows of one day change places: but against most of the steps none is long.
         !steps().any(|step| {
             if on >= back {

@@ -24,7 +24,6 @@ use crate::store::DeliveryOutcome;
 use at_once::{has_begun_in, is_over_by};
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::sync::mpsc;
@@ -451,17 +450,6 @@ impl HookConfig {
     pub fn name(&self) -> String {
         let to = self.to.as_ref();
         to.map_or_else(|| self.run.join(" "), |to| to.name())
-    }
-
-    /// What is shown of it where others than its owner look: without its arguments, which may hold addresses and secrets.
-    pub(super) fn short_name(&self) -> String {
-        let program = || {
-            let path = self.run.first().map(Path::new);
-            let file = path.and_then(Path::file_name);
-            file.map_or_else(String::new, |file| file.to_string_lossy().into_owned())
-        };
-        let to = self.to.as_ref();
-        to.map_or_else(program, |to| to.name())
     }
 
     /// Whether its alerts may wait: for an acknowledgement that does not come in time, or for somebody on duty.

@@ -10,6 +10,7 @@ use crate::runtime::hook::{Alert, HookOutcome, MessageState};
 use crate::runtime::in_hand::InHand;
 use crate::store::DeliveryOutcome;
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex};
 use std::task::Poll;
@@ -58,6 +59,16 @@ fn gravity(alert: &Alert) -> u8 {
 /// What is reported by one run at a time, so that its order stays.
 fn place(alert: &Alert) -> Option<&BenchmarkId> {
     alert.event.benchmark.as_ref()
+}
+
+/// What is shown of a hook where others than its owner look: without its arguments, which may hold addresses and secrets.
+fn short_name(hook: &HookConfig) -> String {
+    let program = || {
+        let file = hook.run.first().map(Path::new).and_then(Path::file_name);
+        file.map_or_else(String::new, |file| file.to_string_lossy().into_owned())
+    };
+    let to = hook.to.as_ref();
+    to.map_or_else(program, |to| to.name())
 }
 
 /// By when it is due, then in order of arrival.
@@ -292,7 +303,7 @@ impl Worker {
             Some(failed) => {
                 let how = format!(
                     "hook {} in {} attempt{}: {}",
-                    self.hook.short_name(),
+                    short_name(&self.hook),
                     waiting.attempt,
                     if waiting.attempt == 1 { "" } else { "s" },
                     failed.in_words()
