@@ -432,9 +432,9 @@ fn a_suspicion_of_another_scale_is_raised_once_where_readings_hover_about_its_bo
     };
     let held = said(true);
     assert_eq!(held.len(), 2, "{held:?}");
-    // They have moved by 2 mm after 200 hours.
+    // They have moved by 2 mm after 200 hours, several readings on either side.
     assert!(
-        held[0].0 < 100 && (190..220).contains(&held[1].0),
+        held[0].0 < 100 && (190..240).contains(&held[1].0),
         "{held:?}"
     );
     // A state of an earlier version is gone through again as it was.
