@@ -77,13 +77,10 @@ fn is_a_part(values: &[(Timestamp, f64)]) -> bool {
         parts.iter().any(|part| {
             // What hardly changes agrees with what is mostly nothing.
             let different: BTreeSet<i16> = civil.iter().map(|at| part(*at)).collect();
-            let agree = civil
-                .iter()
-                .zip(values)
-                .filter(|_| different.len() >= DIFFERENT);
+            let agree = civil.iter().zip(values);
             let agree =
                 agree.filter(|(at, (_, value))| f64::from(part(**at)).total_cmp(value).is_eq());
-            agree.count() as f64 >= AGREEING * values.len() as f64
+            different.len() >= DIFFERENT && agree.count() as f64 >= AGREEING * values.len() as f64
         })
     })
 }

@@ -62,7 +62,7 @@ impl Search<'_> {
         // Warmth and melt water come once a day: a wave of half a day by itself is theirs only where it is none of the moon's.
         let is_half = strongest(&daily, problem).is_some_and(|wave| wave > 0);
         if -less >= self.options.bic_margin || (is_half && !is_apart) {
-            return self.uneven_days_instead(base, one, -less);
+            return self.uneven_days_instead(base, one, &daily);
         }
         self.is_daily = true;
         let by = if less >= 1.0 {
@@ -74,20 +74,23 @@ impl Search<'_> {
             "a daily cycle of 24 and 12 hours, as of warmth or melt water, explains the same{by}"
         ))
     }
-}
 
-impl Search<'_> {
-    /// Why a tide is not concluded though it explains `more` than a daily cycle: one that is stronger on some days than on others has waves
+    /// Why a tide is not concluded though it explains more than a `daily` cycle: one that is stronger on some days than on others has waves
     /// on either side of 24 and 12 hours, and those that mirror the moon's explain a good part of it too.
-    fn uneven_days_instead(&mut self, base: &Fitted, one: &Refitted, more: f64) -> Option<String> {
+    fn uneven_days_instead(
+        &mut self,
+        base: &Fitted,
+        one: &Refitted,
+        daily: &Refitted,
+    ) -> Option<String> {
         let (problem, kind) = (self.problem, one.term.kind);
+        let more = one.gain - daily.gain;
         let lunar = kind.definition().wave_periods.iter();
         let lunar = lunar.filter(|period| !is_daily(**period, problem.span()));
         let mirrored: Vec<f64> = DAILY
             .into_iter()
             .chain(lunar.map(|period| mirror(*period)))
             .collect();
-        let daily = self.refitted(base, &candidates::waves(problem, kind, &DAILY))?;
         let uneven = self.refitted(base, &candidates::waves(problem, kind, &mirrored))?;
         let is_uneven = more > 0.0 && uneven.gain - daily.gain >= UNEVEN * more;
         is_uneven.then(|| {

@@ -199,11 +199,12 @@ pub fn may_still_have_another_scale(values: &[f64], unit: &str) -> bool {
 /// Whether these values span more than readings in metres that are taken for `unit` would, several of them on either side: a few wrong
 /// ones are no motion.
 pub fn have_moved(values: impl IntoIterator<Item = f64>, unit: &str) -> bool {
-    let mut values: Vec<f64> = values
-        .into_iter()
-        .filter(|value| !is_mark(*value))
-        .collect();
-    if unit != "mm" || values.len() <= 2 * WRONG {
+    if unit != "mm" {
+        return false;
+    }
+    let values = values.into_iter().filter(|value| !is_mark(*value));
+    let mut values: Vec<f64> = values.collect();
+    if values.len() <= 2 * WRONG {
         return false;
     }
     let last = values.len() - 1 - WRONG;

@@ -105,11 +105,10 @@ fn clearest(trace: &Trace) -> Option<UnitSlip> {
         .take(MOST)
         .copied()
         .chain(ratios.take(2 * MOST));
-    let mut found: Vec<(f64, UnitSlip)> = jumps
-        .filter_map(|row| Some((steps[row].abs(), slip_at(trace, row + 1)?)))
-        .collect();
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    found.first().map(|(_, slip)| *slip)
+    let found = jumps.filter_map(|row| Some((steps[row].abs(), slip_at(trace, row + 1)?)));
+    // Of equal ones the first.
+    let largest = found.min_by(|a, b| b.0.total_cmp(&a.0));
+    largest.map(|(_, slip)| slip)
 }
 
 /// The change of the unit before the value `from`.
@@ -136,16 +135,12 @@ fn slip_at(trace: &Trace, from: usize) -> Option<UnitSlip> {
     let step_before = usual_step(from.saturating_sub(BESIDE)..from);
     let step_after = usual_step(later.clone());
     let both = TIMES.into_iter().flat_map(|times| [times, times.recip()]);
-    let mut fitting = both.filter_map(|times| {
+    let fitting = both.filter_map(|times| {
         let after = SideLine::through(&points(later.clone(), times))?;
         let error = before.level_error.hypot(after.level_error);
         let is_known = before.scatter > 0.0 && after.scatter > 0.0 && error > 0.1 * finest;
         let off = (before.level - after.level).abs();
-        let (low, high) = (
-            before.scatter * times.min(1.0),
-            after.scatter * times.min(1.0),
-        );
-        let noise = low.max(high).max(error);
+        let noise = (before.scatter.max(after.scatter) * times.min(1.0)).max(error);
         let meets = off <= MEET * error && jump > LEAP * noise;
         let slope_error = before.slope_error.hypot(after.slope_error);
         let differ = (before.slope - after.slope).abs();
@@ -157,12 +152,8 @@ fn slip_at(trace: &Trace, from: usize) -> Option<UnitSlip> {
         let fits = is_known && meets && slopes && scatter && steps;
         fits.then_some((off / error, UnitSlip { from, times }))
     });
-    let first = fitting.next()?;
-    Some(
-        fitting
-            .fold(first, |best, one| if one.0 < best.0 { one } else { best })
-            .1,
-    )
+    let nearest = fitting.min_by(|a, b| a.0.total_cmp(&b.0));
+    nearest.map(|(_, slip)| slip)
 }
 
 #[cfg(test)]

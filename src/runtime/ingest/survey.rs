@@ -16,7 +16,7 @@ const MOST_ROWS: usize = 200_000;
 
 /// What is expected where rows are others than their header says,
 const THE_HEADER: &str = "the header of the rows; where other lines stand before it, skip_lines (--skip-lines) with their number";
-/// and where their cells cannot be told apart.
+/// and where their cells cannot be distinguished.
 const A_DELIMITER: &str = "commas, semicolons or tabs between the cells: let the logger write one of them, or replace what stands there";
 
 /// A table of text, read as nothing but cells.
