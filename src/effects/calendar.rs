@@ -42,20 +42,22 @@ fn counts(channel: &Channel) -> bool {
 
 /// Whether the values lie on a straight line in time.
 fn is_straight(values: &[(Timestamp, f64)]) -> bool {
-    let n = values.len() as f64;
-    let days: Vec<f64> = values
-        .iter()
-        .map(|one| days_since(values[0].0, one.0))
+    let pairs = values.iter();
+    let pairs: Vec<(f64, f64)> = pairs
+        .map(|(time, value)| (days_since(values[0].0, *time), *value))
         .collect();
-    let t = days.iter().sum::<f64>() / n;
-    let y = values.iter().map(|one| one.1).sum::<f64>() / n;
-    let (mut tt, mut ty, mut yy) = (0.0, 0.0, 0.0);
-    for (day, (_, value)) in days.iter().zip(values) {
-        tt += (day - t).powi(2);
-        ty += (day - t) * (value - y);
-        yy += (value - y).powi(2);
-    }
-    tt > 0.0 && yy - ty * ty / tt <= STRAIGHT * yy
+    on_one_line(&pairs, STRAIGHT)
+}
+
+/// Whether a straight line of the one by the other leaves less than this share of its variance; neither is constant then.
+pub(super) fn on_one_line(pairs: &[(f64, f64)], left: f64) -> bool {
+    let n = pairs.len() as f64;
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
+    let means = (mean(&|pair| pair.0), mean(&|pair| pair.1));
+    let own = mean(&|pair| (pair.0 - means.0).powi(2));
+    let theirs = mean(&|pair| (pair.1 - means.1).powi(2));
+    let both = mean(&|pair| (pair.0 - means.0) * (pair.1 - means.1));
+    own * theirs > 0.0 && own * theirs - both * both < left * own * theirs
 }
 
 /// Whether they are the year, the month, the day of the month or of the year, the hour or the minute of one time zone.

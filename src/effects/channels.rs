@@ -1,9 +1,9 @@
 //! Which covariates count as evidence: each once, and only those that cover the record.
 
-use super::calendar::is_of_the_calendar;
+use super::calendar::{is_of_the_calendar, on_one_line};
 use super::problem::Problem;
 use super::response::Driver;
-use crate::reading::{Channel, after_days};
+use crate::reading::{Channel, after_days, counted};
 
 /// A covariate must cover this share of the record.
 const LEAST_COVERAGE: f64 = 0.8;
@@ -67,12 +67,7 @@ fn same_values(one: &Channel, other: &Channel) -> bool {
     if n < 0.5 * one.samples.len() as f64 || n < 10.0 {
         return false;
     }
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
-    let means = (mean(&|pair| pair.0), mean(&|pair| pair.1));
-    let own = mean(&|pair| (pair.0 - means.0).powi(2));
-    let theirs = mean(&|pair| (pair.1 - means.1).powi(2));
-    let both = mean(&|pair| (pair.0 - means.0) * (pair.1 - means.1));
-    own * theirs > 0.0 && own * theirs - both * both < SAME * own * theirs
+    on_one_line(&pairs, SAME)
 }
 
 /// The covariates that cover the record; the others are reported to the reader.
@@ -118,10 +113,7 @@ fn of_gaps(problem: &Problem, driver: &Driver) -> Option<String> {
     }
     let more = each.len().saturating_sub(NAMED_GAPS);
     each.truncate(NAMED_GAPS);
-    let rest = (more > 0).then(|| {
-        let plural = if more == 1 { "" } else { "s" };
-        format!("and in {more} more gap{plural}")
-    });
+    let rest = (more > 0).then(|| format!("and in {}", counted(more, "more gap", "more gaps")));
     each.extend(rest);
     (!each.is_empty()).then(|| {
         format!(

@@ -1,5 +1,7 @@
 //! Figures for people: a number of three hundred digits is none.
 
+use std::fmt::Display;
+
 /// From here on a figure stands in powers of ten; no slope, and no speed of one, is as large in mm or in mm/day.
 const LARGE: f64 = 1e9;
 /// Below this one that is given by all of its digits does too.
@@ -12,6 +14,15 @@ pub fn figure(value: f64, decimals: usize) -> String {
     } else {
         format!("{value:.decimals$}")
     }
+}
+
+/// `1 gap`, `3 gaps`.
+pub fn counted<N>(count: N, one: &str, several: &str) -> String
+where
+    N: Copy + Display + PartialEq + From<u8>,
+{
+    let what = if count == N::from(1) { one } else { several };
+    format!("{count} {what}")
 }
 
 /// `value` by all digits that it was read with, or, where it is too large or too small to be read so, as `1e308`.

@@ -18,7 +18,7 @@ mod unit;
 pub use conventions::{Conventions, LocalClock, MissingValues, SummerTime, TimeFault};
 pub use covariate::CovariateKind;
 pub use dialect::{DecimalMark, Delimiter, Dialect, MOST_SKIPPED, ThousandsMark, TimeFormat};
-pub use figure::{figure, shortest, whole_figure};
+pub use figure::{counted, figure, shortest, whole_figure};
 pub use jiff::Timestamp;
 pub use plain::plain;
 pub use recording::{MergeError, Recording, SelectError};

@@ -3,7 +3,7 @@
 use crate::alert::{hours_in_words, percent_in_words};
 use crate::cli::text;
 use crate::monitor::{Event, EventKind, FailureTime};
-use crate::reading::{Timestamp, figure};
+use crate::reading::{Timestamp, counted, figure};
 use crate::runtime::view::{AlertLife, AlertView};
 use crate::store::DeliveryRow;
 use jiff::tz::TimeZone;
@@ -185,15 +185,14 @@ fn deliveries(rows: &[DeliveryRow]) -> String {
             "closed" => "was closed: the config has no such hook any more",
             _ => "",
         };
-        let attempts = row.attempts;
-        let plural = if attempts == 1 { "" } else { "s" };
         let _ = writeln!(
             out,
-            "  {} {}: {} {meaning} ({}, {attempts} attempt{plural})",
+            "  {} {}: {} {meaning} ({}, {})",
             row.level,
             row.state,
             text::plain(&row.hook),
-            row.status
+            row.status,
+            counted(row.attempts, "attempt", "attempts")
         );
     }
     out

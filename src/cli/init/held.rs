@@ -22,6 +22,17 @@ pub(super) enum FoundInFile {
     Bad(String),
 }
 
+impl FoundInFile {
+    /// Where a flag helps, what is said names it.
+    fn unusable(problem: String) -> Self {
+        if problem.contains("--") {
+            Self::Open(problem)
+        } else {
+            Self::Bad(problem)
+        }
+    }
+}
+
 /// Looks through a file.
 pub(super) fn held(
     file: &Path,
@@ -57,17 +68,11 @@ pub(super) fn held(
         let problem = without_readings(file, &looked);
         return Ok(match covariates_alone(&looked) {
             Some(names) => FoundInFile::Covariates(names, problem),
-            // Where a flag helps, what is said names it.
-            None if problem.contains("--") => FoundInFile::Open(problem),
-            None => FoundInFile::Bad(problem),
+            None => FoundInFile::unusable(problem),
         });
     }
     if let Some(problem) = mostly_refused(file, &looked) {
-        return Ok(if problem.contains("--") {
-            FoundInFile::Open(problem)
-        } else {
-            FoundInFile::Bad(problem)
-        });
+        return Ok(FoundInFile::unusable(problem));
     }
     Ok(FoundInFile::Benchmarks(one_quantity_each(found)))
 }

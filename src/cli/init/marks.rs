@@ -182,14 +182,12 @@ fn are_numbers(cells: &[String]) -> bool {
 
 /// What all of these columns say; where one contradicts another, a cell of each.
 fn verdict_of(columns: &[&Vec<String>]) -> MarkVerdict {
-    let each: Vec<MarkVerdict> = columns
+    let marked: Vec<MarkedCells> = columns.iter().map(|cells| MarkedCells::of(cells)).collect();
+    let each: Vec<MarkVerdict> = marked.iter().map(MarkedCells::verdict).collect();
+    let mut contradictions = each
         .iter()
-        .map(|cells| MarkedCells::of(cells).verdict())
-        .collect();
-    if let Some(found) = each
-        .iter()
-        .find(|one| matches!(one, MarkVerdict::Contradiction(..)))
-    {
+        .filter(|one| matches!(one, MarkVerdict::Contradiction(..)));
+    if let Some(found) = contradictions.next() {
         return found.clone();
     }
     let sure = |wanted| {
@@ -210,13 +208,11 @@ fn verdict_of(columns: &[&Vec<String>]) -> MarkVerdict {
             }
         })
     };
-    let parted = |part: fn(&MarkedCells) -> &Vec<String>| {
-        let mut marked = columns.iter().map(|cells| MarkedCells::of(cells));
-        marked.any(|one| !part(&one).is_empty())
-    };
     let (point, comma) = (sure(DecimalMark::Point), sure(DecimalMark::Comma));
-    let open_point = open(DecimalMark::Point).filter(|_| !parted(|one| &one.parted_by_points));
-    let open_comma = open(DecimalMark::Comma).filter(|_| !parted(|one| &one.parted_by_commas));
+    let is_parted =
+        |part: fn(&MarkedCells) -> &Vec<String>| marked.iter().any(|one| !part(one).is_empty());
+    let open_point = open(DecimalMark::Point).filter(|_| !is_parted(|one| &one.parted_by_points));
+    let open_comma = open(DecimalMark::Comma).filter(|_| !is_parted(|one| &one.parted_by_commas));
     match (point.or(open_point), comma.or(open_comma)) {
         (Some(point), Some(comma)) => MarkVerdict::Contradiction(point.clone(), comma.clone()),
         (Some(cell), None) if point.is_some() => {

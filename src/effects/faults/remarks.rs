@@ -3,7 +3,7 @@
 use super::super::explanation::Fault;
 use super::super::kind::FaultKind;
 use super::smooth::Smoothness;
-use crate::reading::{Timestamp, Unit};
+use crate::reading::{Timestamp, Unit, counted};
 
 /// More instances than this are counted and not listed.
 const LISTED: usize = 4;
@@ -150,8 +150,4 @@ fn interpolated(source: &str, smoothness: Option<Smoothness>) -> String {
 
 fn date(time: Timestamp) -> String {
     time.strftime("%Y-%m-%d").to_string()
-}
-
-fn counted(count: usize, one: &str, several: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { several })
 }

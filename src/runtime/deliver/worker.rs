@@ -3,7 +3,7 @@
 use super::{QUEUE, Retry, Runner, locked};
 use crate::alert::Level;
 use crate::config::HookConfig;
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, Timestamp, counted};
 use crate::runtime::clock;
 use crate::runtime::delivered::Delivered;
 use crate::runtime::hook::{Alert, HookOutcome, MessageState};
@@ -302,10 +302,9 @@ impl Worker {
             Some(HookOutcome::Done) => delivered.fails_no_more(&hook),
             Some(failed) => {
                 let how = format!(
-                    "hook {} in {} attempt{}: {}",
+                    "hook {} in {}: {}",
                     short_name(&self.hook),
-                    waiting.attempt,
-                    if waiting.attempt == 1 { "" } else { "s" },
+                    counted(waiting.attempt, "attempt", "attempts"),
                     failed.in_words()
                 );
                 delivered.fails(&hook, &waiting.alert, &how);

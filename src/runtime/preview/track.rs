@@ -172,8 +172,9 @@ impl PreviewTrack {
         let mut gaps: Vec<i64> = pairs.map(|(b, a)| b.duration_since(*a).as_secs()).collect();
         gaps.sort_unstable();
         self.view.every_s = gaps.get(gaps.len() / 2).copied();
-        self.view.moved_mm = self.moved_mm();
-        self.view.suspicions = self.suspicions(newest, now);
+        let (values, of_resets) = self.without_resets();
+        self.view.moved_mm = self.moved_mm(&values);
+        self.view.suspicions = self.suspicions(newest, now, &values, of_resets);
         self.view.remarks = self.remarks(&merged, clock, name);
         self.view.remarks.extend(self.age(now));
         self.view
@@ -220,17 +221,20 @@ impl PreviewTrack {
         remarks
     }
 
-    fn values(&self) -> Vec<(Timestamp, f64)> {
+    /// The readings, displacements without what they jump by at declared resets, and what contradicts those.
+    fn without_resets(&self) -> (Vec<(Timestamp, f64)>, Vec<String>) {
         let readings = self.readings.iter();
-        readings.map(|one| (one.time, one.value)).collect()
+        let values: Vec<_> = readings.map(|one| (one.time, one.value)).collect();
+        match self.view.quantity {
+            Quantity::Displacement => self.resets.taken_off(&values, self.unit),
+            Quantity::Velocity => (values, Vec::new()),
+        }
     }
 
-    fn moved_mm(&self) -> Option<f64> {
-        if self.view.quantity != Quantity::Displacement {
-            return None;
-        }
-        let (values, _) = self.resets.taken_off(&self.values(), self.unit);
-        Some((values.last()?.1 - values.first()?.1) * self.unit.factor())
+    fn moved_mm(&self, values: &[(Timestamp, f64)]) -> Option<f64> {
+        let is_displacement = self.view.quantity == Quantity::Displacement;
+        let moved = values.last()?.1 - values.first()?.1;
+        is_displacement.then(|| moved * self.unit.factor())
     }
 
     /// What to ask where the newest reading is old, or all of them go over more years than instruments do.
@@ -251,20 +255,21 @@ impl PreviewTrack {
         ))
     }
 
-    fn suspicions(&self, newest: Option<Timestamp>, now: Timestamp) -> Vec<String> {
+    fn suspicions(
+        &self,
+        newest: Option<Timestamp>,
+        now: Timestamp,
+        values: &[(Timestamp, f64)],
+        of_resets: Vec<String>,
+    ) -> Vec<String> {
         let ahead = newest
             .and_then(|newest| suspicion::ahead(newest, now))
             .into_iter();
-        let values = self.values();
         let (quantity, unit) = (self.view.quantity, &self.view.unit);
-        let (values, of_resets) = match quantity {
-            Quantity::Displacement => self.resets.taken_off(&values, self.unit),
-            Quantity::Velocity => (values, Vec::new()),
-        };
-        let backwards = self.moves_backwards(&values);
+        let backwards = self.moves_backwards(values);
         let is_accepted = self.accepted.contains(&Suspicion::Scale);
-        let other = other_unit::standing(&values, quantity).filter(|_| !is_accepted);
-        let of_values = suspicion::of_values(&values, quantity, unit);
+        let other = other_unit::standing(values, quantity).filter(|_| !is_accepted);
+        let of_values = suspicion::of_values(values, quantity, unit);
         // One step is no fall of the slope and another unit.
         let step = other.as_ref().map(OtherUnit::at);
         let of_values = of_values.into_iter();
