@@ -20,6 +20,7 @@ mod faults;
 mod findings;
 mod frame;
 mod fresh;
+mod gain_interval;
 mod given;
 mod inverted;
 mod judge;

@@ -1,19 +1,19 @@
 //! From what a search accepted to what is said: the verdict, what stands beside it, and how much is explained.
 
 use super::act::Act;
-use super::candidates::with_response;
 use super::daily;
 use super::dated;
 use super::definition::{EffectSize, FittedCoefficients};
 use super::diagnosis::{Judged, innovations, newest_off};
 use super::explanation::{Candidate, Effect, Explained};
+use super::gain_interval;
 use super::judge::{coefficients, named};
 use super::kind::Kind;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
 use super::ready::Ready;
-use super::refit::{Fitted, Start, jacobian, refit, under_likeliest};
-use super::response::{Driver, Response};
+use super::refit::{Fitted, Start, refit, under_likeliest};
+use super::response::Driver;
 use super::rival::Rival;
 use super::search::{Accepted, SIGNIFICANT, SearchResult};
 use super::term::{Scratch, Term, law_parameters, time_of};
@@ -27,9 +27,6 @@ pub(super) struct Verdict {
     /// The law with the effects that stand.
     pub(super) full: Fitted,
 }
-
-/// By so much of its ln a delay is moved to see what it changes.
-const NUDGE: f64 = 0.1;
 
 /// Explained in full, the residual is at most this many times the white noise.
 pub(super) const LARGEST_REST: f64 = 2.0;
@@ -51,8 +48,6 @@ const OUT_OF_NOISE: f64 = 5.0;
 const MOST_LABELS: usize = 2;
 /// Steps of a finite length pass a failure: the law fails where it is so many times faster than it ever was with all its effects.
 const RUNS_AWAY: f64 = 30.0;
-/// 5 and 95 % of a normal distribution, in standard deviations.
-const NINETY: f64 = 1.645;
 
 /// Concludes: a kind without independent evidence stands as the verdict only if nothing is left unexplained after it.
 pub(super) fn conclude(
@@ -365,14 +360,13 @@ pub(super) fn effect(
         ..Effect::of(term.kind)
     };
     if said.gain_per_sd.is_some() {
-        let deviation = deviation(ready, full, index, scratch);
         let scale = if matches!(term.act, Act::Reading(_)) {
             factor
         } else {
             1.0
         };
-        said.gain_interval =
-            deviation.map(|d| [(own[0] - NINETY * d) / scale, (own[0] + NINETY * d) / scale]);
+        let bounds = gain_interval::interval(ready, full, index, scratch);
+        said.gain_interval = bounds.map(|bounds| bounds.map(|bound| bound / scale));
     }
     said
 }
@@ -388,37 +382,6 @@ fn size(ready: &Ready, term: &Term, values: &[f64]) -> EffectSize {
         spacing_days: problem.spacing,
     };
     (term.kind.definition().size)(&fitted)
-}
-
-/// Standard deviation of a term's first coefficient, all others free, and its delay.
-fn deviation(ready: &Ready, full: &Fitted, index: usize, scratch: &mut Scratch) -> Option<f64> {
-    let problem = &ready.problem;
-    let whitener = ready
-        .bank
-        .iter()
-        .find(|whitener| whitener.noise == full.noise)?;
-    let mut columns = jacobian(problem, full, scratch);
-    let earlier: usize = full.terms[..index].iter().map(Term::coefficients).sum();
-    let own = columns.remove(super::term::law_parameters(problem) + earlier);
-    columns.extend(by_delay(ready, full, index, scratch));
-    let frame = super::frame::Frame::new(whitener.clone(), &own, &columns);
-    Some(full.sigma / frame.misfit.sqrt())
-}
-
-/// What the delay of a term's response changes of the prediction of every reading, by its ln; `None` without one.
-fn by_delay(ready: &Ready, full: &Fitted, index: usize, scratch: &mut Scratch) -> Option<Vec<f64>> {
-    let (problem, term) = (&ready.problem, &full.terms[index]);
-    let own = term.response.filter(|own| own.mean_days > 0.0)?;
-    let longer = Response {
-        mean_days: own.mean_days * NUDGE.exp(),
-        ..own
-    };
-    let driver = Driver::at(&ready.drivers, term.channel)?;
-    let mut terms = full.terms.clone();
-    terms[index] = with_response(problem, term, driver, longer)?;
-    let is_motion = scratch.predict(problem, &terms, &full.parameters);
-    let both = scratch.prediction.iter().zip(&full.prediction);
-    is_motion.then(|| both.map(|(then, now)| (then - now) / NUDGE).collect())
 }
 
 /// What a term adds to the prediction of every reading: with it, less without. Not a number where the law without it fails within
