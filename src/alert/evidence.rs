@@ -11,8 +11,10 @@ pub struct AlertEvidence {
     pub now: Timestamp,
     /// Chance of a collapse within [`super::Policy::red_within`] of the next reading, where there is a forecast.
     pub chance_for_red: Option<f64>,
-    /// Whether that chance was under what calls red not long ago, and is not so large that it calls red at once.
-    pub is_red_pending: bool,
+    /// What its course makes of that chance, where it is one that calls red.
+    pub red: RedCourse,
+    /// Whether red was in force of late.
+    pub was_red: bool,
     /// The chance within the outlook.
     pub chance_within_outlook: Option<f64>,
     /// Latest observed velocity, mm/day; `None` before the second reading.
@@ -48,6 +50,18 @@ impl AlertEvidence {
         let own = self.chances.iter().find(|(within, _)| *within == span);
         own.map(|(_, chance)| *chance)
     }
+}
+
+/// What the course of a chance makes of one that calls red.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum RedCourse {
+    /// It calls red.
+    #[default]
+    Agrees,
+    /// It was under what calls red not long ago, and is not so large that it calls red at once: red is pending, and orange is called.
+    IsNear,
+    /// The same, and it was far under it: nothing is called by it.
+    Pending,
 }
 
 /// What calls for attention although no chance is large.

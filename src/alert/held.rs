@@ -1,7 +1,7 @@
 //! Which rules are due that ask for some time: since when their conditions have held.
 
 use super::declared::{Condition, DeclaredRule, PREFIX};
-use super::evidence::AlertEvidence;
+use super::evidence::{AlertEvidence, RedCourse};
 use super::policy::Policy;
 use super::rules::RED_CHANCE;
 use crate::reading::Timestamp;
@@ -89,7 +89,8 @@ impl Held {
             self.rules.contains_key(&rule.name) && !evidence.due.contains(index)
         };
         let rules = policy.rules.iter().enumerate().filter(is_pending);
-        let red = evidence.is_red_pending.then(|| RED_CHANCE.to_owned());
+        let is_pending = evidence.red != RedCourse::Agrees;
+        let red = is_pending.then(|| RED_CHANCE.to_owned());
         red.into_iter()
             .chain(rules.map(|(_, rule)| rule.id()))
             .collect()
@@ -137,9 +138,15 @@ impl Held {
             at: evidence.now,
             ln_odds: mean,
         });
-        evidence.is_red_pending = chance >= policy.red_chance
-            && chance < policy.red_at_once()
-            && mean < ln_odds(policy.red_mean_chance());
+        let agrees = chance >= policy.red_at_once() || mean >= ln_odds(policy.red_mean_chance());
+        evidence.red = if chance < policy.red_chance || agrees || evidence.was_red {
+            // A slope that was red of late and pauses has shown already that it can run away.
+            RedCourse::Agrees
+        } else if mean >= ln_odds(policy.red_near_chance()) {
+            RedCourse::IsNear
+        } else {
+            RedCourse::Pending
+        };
     }
 }
 
@@ -263,7 +270,13 @@ mod tests {
         // After a quiet day it takes a while, the less the higher it is.
         assert_eq!(level(24 * 60, 0.02), (Level::Green, 0));
         for minutes in (24 * 60 + 10..40 * 60).step_by(10) {
-            assert_eq!(level(minutes, 0.3), (Level::Green, 1), "{minutes}");
+            // Orange after some three hours: red is near.
+            let meanwhile = if minutes < 27 * 60 - 10 {
+                Level::Green
+            } else {
+                Level::Orange
+            };
+            assert_eq!(level(minutes, 0.3), (meanwhile, 1), "{minutes}");
         }
         assert_eq!(level(45 * 60, 0.4), (Level::Red, 0));
         assert_eq!(level(72 * 60, 0.02), (Level::Green, 0));
@@ -276,6 +289,24 @@ mod tests {
         // Readings that are further apart have no others between them.
         assert_eq!(level(114 * 60, 0.02), (Level::Green, 0));
         assert_eq!(level(138 * 60, 0.3), (Level::Red, 0));
+    }
+
+    #[test]
+    fn a_chance_calls_red_at_once_where_red_was_in_force_of_late() {
+        let (policy, mut held) = (Policy::default(), Held::default());
+        let mut level = |minutes: i64, chance: f64, was_red: bool| {
+            let mut one = AlertEvidence {
+                now: Timestamp::UNIX_EPOCH + minutes.minutes(),
+                chance_for_red: Some(chance),
+                was_red,
+                ..AlertEvidence::default()
+            };
+            held.update(&policy, &mut one);
+            policy.call(&one).level
+        };
+        assert_eq!(level(0, 0.001, true), Level::Green);
+        assert_eq!(level(10, 0.3, false), Level::Green);
+        assert_eq!(level(20, 0.3, true), Level::Red);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! A forecast that changes its mind does not lower a level. What does: the slope has slowed to half the
 //! highest velocity seen at this level, without gaining, for a whole evacuation time in which the evidence
-//! called for less; or it has been seen to hold a velocity under the critical one, without gaining, for the stated time, and is no faster
+//! called for less, and for less than orange where it is red; or it has been seen to hold a velocity under the critical one, without gaining, for the stated time, and is no faster
 //! than when the level was called, or nothing is called any more. What
 //! lies within the error of a velocity is no gain, and motion that never stood out of it has not to slow down.
 
@@ -236,7 +236,9 @@ impl Latch {
         }
         // Motion that never stood out of its error has not to slow down.
         let is_slow = self.has_slowed_to(velocity, error) || self.peak_velocity <= 0.0;
-        let slowed = less && is_slow;
+        // Many a slope pauses before it collapses: while the chance within the outlook calls orange red is not over because it has.
+        let pauses = self.level == Level::Red && call.level == Level::Orange;
+        let slowed = less && is_slow && !pauses;
         // A slope that has become faster since the level was called is not over it while more than nothing is called.
         let is_no_faster = velocity <= STEADY_GAIN * self.first_velocity + CLEAR * error;
         let is_over = is_no_faster || self.first_velocity <= 0.0 || call.level == Level::Green;
@@ -416,6 +418,23 @@ mod tests {
         let fall = latch.update(&policy, &evidence(25, 0.0, 30.0));
         assert_eq!((fall[0].level, &*fall[0].rule), (Level::Red, "decelerated"));
         assert_eq!(latch.level(), Level::Green);
+    }
+
+    #[test]
+    fn a_pause_does_not_end_red_while_the_chance_within_the_outlook_calls_orange() {
+        let (policy, mut latch) = red_at_hundred();
+        let pausing = |hour: i64, outlook: f64| AlertEvidence {
+            chance_within_outlook: Some(outlook),
+            ..evidence(hour, 0.1, 20.0)
+        };
+        for hour in 1..=5 * 24 {
+            latch.update(&policy, &pausing(hour, 0.8));
+            assert_eq!(latch.level(), Level::Red, "hour {hour}");
+        }
+        for hour in 5 * 24 + 1..=6 * 24 + 2 {
+            latch.update(&policy, &pausing(hour, 0.4));
+        }
+        assert_eq!(latch.level(), Level::Yellow);
     }
 
     #[test]

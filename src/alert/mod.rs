@@ -14,7 +14,7 @@ mod rules;
 
 pub use chance::{chance_in_words, hours_in_words, percent_in_words};
 pub use declared::{Combination, Condition, DeclaredRule};
-pub use evidence::{AlertCause, AlertEvidence};
+pub use evidence::{AlertCause, AlertEvidence, RedCourse};
 pub use held::Held;
 pub(crate) use latch::another_since;
 pub use latch::{Entered, Latch, Transition};

@@ -57,6 +57,10 @@ const EVACUATIONS_AHEAD: i32 = 2;
 const COURSE_PART: i32 = 2;
 const MEAN_ODDS: f64 = 2.0 / 3.0;
 const ODDS_AT_ONCE: f64 = 4.0;
+/// Red that is pending calls orange when the mean has come to odds of this share.
+const NEAR_ODDS: f64 = 1.0 / 7.0;
+/// Red was in force of late within so many of the times that a slope must be steady. Slopes pause for 2 to 10 days before they collapse.
+const OF_LATE: i32 = 2;
 /// The next reading is taken to be no further away than so many of the spans that are counted from it.
 const MOST_INTERVALS: i32 = 2;
 
@@ -88,6 +92,16 @@ impl Policy {
     /// The mean chance over [`Policy::red_course`] that calls red beside [`Policy::red_chance`].
     pub fn red_mean_chance(&self) -> f64 {
         with_odds_times(self.red_chance, MEAN_ODDS)
+    }
+
+    /// The mean chance that calls orange while red is pending.
+    pub fn red_near_chance(&self) -> f64 {
+        with_odds_times(self.red_chance, NEAR_ODDS)
+    }
+
+    /// For how long after red was in force a chance calls it again at once.
+    pub fn red_of_late(&self) -> SignedDuration {
+        self.steady_for.saturating_mul(OF_LATE)
     }
 
     /// The chance that calls red at once.

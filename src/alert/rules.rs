@@ -1,6 +1,6 @@
 //! The rules: which level the evidence calls for, before any memory.
 
-use super::evidence::AlertEvidence;
+use super::evidence::{AlertEvidence, RedCourse};
 use super::level::Level;
 use super::policy::{Policy, Threshold};
 use std::borrow::Cow;
@@ -30,7 +30,9 @@ impl Policy {
                 level: Level::Red,
                 rule: "critical-velocity".into(),
             }
-        } else if reaches(evidence.chance_for_red, self.red_chance) && !evidence.is_red_pending {
+        } else if reaches(evidence.chance_for_red, self.red_chance)
+            && evidence.red == RedCourse::Agrees
+        {
             Call {
                 level: Level::Red,
                 rule: RED_CHANCE.into(),
@@ -39,6 +41,11 @@ impl Policy {
             Call {
                 level: Level::Orange,
                 rule: "chance-within-outlook".into(),
+            }
+        } else if evidence.red == RedCourse::IsNear {
+            Call {
+                level: Level::Orange,
+                rule: RED_CHANCE.into(),
             }
         } else if reaches(evidence.chance_within_outlook, self.yellow_chance) {
             Call {

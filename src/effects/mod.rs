@@ -38,6 +38,7 @@ mod together;
 mod channels;
 mod choice;
 mod linear;
+mod margin;
 mod noise;
 mod prior;
 mod problem;

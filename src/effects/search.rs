@@ -2,15 +2,15 @@
 
 use super::act::Act;
 use super::candidates;
-use super::definition::{Support, Trying};
+use super::definition::Support;
 use super::explanation::Candidate;
 use super::fresh::best_of_starts;
 use super::inverted::inverted_starts;
 use super::judge::{
-    Compared, HeldOut, StepErrors, block, held_out, most_extrapolated, objection, step_errors,
+    Compared, HeldOut, StepErrors, block, held_out, most_extrapolated, step_errors,
 };
 use super::kind::Kind;
-use super::noise::{Memory, Whitener};
+use super::noise::Whitener;
 use super::options::Options;
 use super::problem::Problem;
 use super::refit::{Fitted, Start, plain_starts, refit_every_memory};
@@ -36,10 +36,6 @@ const FAR_NEARER: f64 = 0.7;
 
 /// By how much of the BIC a fit is better for the search to begin with it again.
 const BETTER: f64 = 1.0;
-
-/// So many times the usual margin of the BIC is asked of what only the shape of the readings supports: on walks of .05 to .5 of the white
-/// noise 26 of 32 false ones gained less, and none of 70 true ones.
-const BY_SHAPE: f64 = 2.0;
 
 /// The load steps by less than this where the velocity's own jump goes unseen, e-folds.
 const LEAST_JUMP: f64 = 0.1;
@@ -301,38 +297,6 @@ impl Search<'_> {
             return (None, None);
         }
         self.held_out(base, one)
-    }
-
-    /// Why not, before any later block is looked at: what it gains, by chance too, and what the physics allow.
-    pub(super) fn refused_at_once(&self, one: &Refitted) -> Option<String> {
-        let margin = self.margin(one);
-        if one.gain < margin {
-            return Some(format!(
-                "the BIC falls by {:.1} only, {margin} is asked for",
-                one.gain
-            ));
-        }
-        if one.p_value >= SIGNIFICANT {
-            return Some(format!(
-                "without any effect a search gains as much in {:.0} % of cases",
-                100.0 * one.p_value
-            ));
-        }
-        objection(self.problem, &one.fitted, self.drivers)
-    }
-
-    /// By how much the BIC has to fall. A walk of the readings that is so small that the law takes it up leaves bends which no noise of the
-    /// bank is like: what only the shape of the readings shows, and what happened at a time, has to gain more.
-    fn margin(&self, one: &Refitted) -> f64 {
-        let definition = one.term.kind.definition();
-        let is_dated = matches!(definition.trying, Trying::Once(_) | Trying::JumpOfReading);
-        let is_by_shape = is_dated || definition.support == Support::Nothing;
-        // Where the noise remembers, the noise of the bank does too.
-        if is_by_shape && one.fitted.noise.memory != Memory::Reading {
-            BY_SHAPE * self.options.bic_margin
-        } else {
-            self.options.bic_margin
-        }
     }
 
     fn withhold(&mut self, one: &Refitted) {

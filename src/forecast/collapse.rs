@@ -37,6 +37,9 @@ const SLOWED: f64 = 0.5;
 /// ratio. Set on simulated slopes: storms, thaws and fits of stick-slip repeat, and a collapse is mostly faster than all
 /// before it.
 const SURVIVED: i32 = 2;
+/// A slope at this velocity, mm/day, or under it, is the less likely to collapse within a span: the slowest of 30 slopes that collapsed was
+/// last read at .475 mm/day (Federico et al. 2012).
+const SLOW: f64 = 0.25;
 /// Over how many shorter scales the growth of the velocity is looked for.
 const GROWN_SCALES: usize = 10;
 /// How far the growth of a slope that runs up departs from a straight line in inverse velocity, and what is left of the chance
@@ -102,7 +105,11 @@ impl Indicators {
 
     /// Probability that the slope accelerates, against steady motion under its usual fluctuations.
     pub fn accelerating(&self) -> f64 {
-        evidence::probability(self.evidence.ln_odds())
+        let whole = evidence::probability(self.evidence.ln_odds());
+        let later = self.later.as_ref();
+        later.map_or(whole, |(share, later)| {
+            whole.max(share * later.accelerating())
+        })
     }
 
     /// Median of the newest spans between readings, days.
@@ -236,7 +243,16 @@ fn goes_on(scales: &Scales, power: usize) -> f64 {
     let highest = ln_above(scale.highest_velocity, error(scale));
     let since = view.ln_velocity(-view.span) - view.ln_velocity(0);
     let ever = view.ln_velocity(0) - highest;
-    (since.exp() / SLOWED).min(1.0) * ever.exp().min(1.0).powi(SURVIVED)
+    (since.exp() / SLOWED).min(1.0) * ever.exp().min(1.0).powi(SURVIVED) * is_fast(scales, power)
+}
+
+/// The share of the chance within the span of scale `power` that is left to a slope for its velocity, the highest now of that scale and the shorter
+/// ones.
+fn is_fast(scales: &Scales, power: usize) -> f64 {
+    let view = View::at(scales, power);
+    let fastest = (-view.span..=0).map(|shorter| view.ln_velocity(shorter));
+    let fastest = fastest.fold(f64::NEG_INFINITY, f64::max).exp();
+    1.0 / (1.0 + (SLOW / fastest).powi(4))
 }
 
 /// The share of the chance within such a span that is reported of a slope that may creep steadily: all scales
@@ -485,6 +501,32 @@ mod tests {
         assert!(steady.sure.chance_within(30.0) < 0.1, "{steady:?}");
         assert!(steady.passage.chance_within(400.0) < 0.2, "{steady:?}");
         assert!(steady.sure.chance_within(1.0) < 0.02, "{steady:?}");
+    }
+
+    #[test]
+    fn levels_go_by_less_where_a_slope_moves_slower_than_any_that_was_seen_to_collapse() {
+        let red = |size: f64| {
+            let failing = readings(190, 0.5, |t| -size * (1.0 - t / 96.0).ln());
+            let sure = collapse(&failing).sure;
+            sure.chance_within(4.0)
+        };
+        // At the end 40 mm/day, and .06.
+        assert!(red(60.0) > 0.3, "{}", red(60.0));
+        assert!(red(0.08) < 0.1, "{}", red(0.08));
+    }
+
+    #[test]
+    fn an_earlier_surge_does_not_hide_the_end_of_a_slope() {
+        let noise = |t: f64| 0.5 * (t * 977.0).sin();
+        let end = |t: f64| -40.0 * (1.0 - t / 96.0).ln();
+        let surge = |t: f64| 150.0 / (1.0 + (-(t - 50.0) / 1.5).exp());
+        let without = collapse(&readings(380, 0.25, |t| t + end(t) + noise(t)));
+        let with = collapse(&readings(380, 0.25, |t| t + end(t) + surge(t) + noise(t)));
+        let chances = [&without, &with].map(|one| one.sure.chance_within(2.0));
+        assert!(
+            chances[0] > 0.4 && chances[1] > 0.5 * chances[0],
+            "{chances:?}"
+        );
     }
 
     #[test]

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 /// Readings away from the course, at most.
 const MOST: usize = 3;
 /// So many standard errors of a reading they are away, at least,
-const AWAY: f64 = 12.0;
+const AWAY: f64 = 6.0;
 /// and farther than the slope moves meanwhile; each of them by this share of the farthest.
 const ALIKE: f64 = 0.5;
 /// Fewer readings show nothing.
@@ -16,7 +16,7 @@ const FEWEST: usize = 10;
 
 /// The observations without those that left the course and came back for two readings at least. The newest ones always stay: they may be the
 /// first of a motion.
-pub(crate) fn without_excursions(observations: &Observations) -> Cow<'_, Observations> {
+pub(super) fn without_excursions(observations: &Observations) -> Cow<'_, Observations> {
     let values = &observations.values;
     if observations.quantity != Quantity::Displacement || values.len() < FEWEST {
         return Cow::Borrowed(observations);

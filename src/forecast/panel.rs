@@ -2,6 +2,7 @@
 //! load averaged over its shapes and its starts, the regime and the passage of a critical velocity.
 
 use super::excursions::without_excursions;
+use super::isolated_step::without_isolated_step;
 use super::surprise::Surprise;
 use super::{Indicators, Members, Passage};
 use crate::fit::{Ensemble, LoadPosterior, Observation, Observations, Rate, RateOptions};
@@ -9,6 +10,7 @@ use crate::model::{Accuracy, Law, Trajectory};
 use crate::reading::Quantity;
 use crate::regime::Regime;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Fewest readings before anything is forecast: below it the priors would decide, not the slope.
@@ -150,6 +152,11 @@ impl LawForecaster {
     }
 }
 
+/// `observations` without what is no motion of a slope.
+pub(crate) fn of_motion(observations: &Observations) -> Cow<'_, Observations> {
+    without_isolated_step(without_excursions(observations))
+}
+
 /// What `observations` give by themselves, with `critical` in mm/day, and the laws they leave open; `None` with too few
 /// readings.
 pub(crate) fn outlook(
@@ -159,7 +166,7 @@ pub(crate) fn outlook(
     if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
         return None;
     }
-    let observations = &*without_excursions(observations);
+    let observations = &*of_motion(observations);
     let now_days = observations.values.last()?.t_days;
     let rates = observations.rates(0..observations.values.len(), RateOptions::default());
     let posterior = LoadPosterior::fit(&rates);

@@ -14,6 +14,8 @@ const MOST_EVENTS: usize = 2;
 const ONE_EVENT: usize = 6;
 const EVENTS: usize = 12;
 const ABOVE_NEXT: f64 = 4.0;
+/// An event is over when so much of its slow-down has passed.
+const MOST_OF_IT: f64 = 0.8;
 
 /// An event after which the slope slowed down by far more than it usually does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,6 +66,24 @@ pub(super) fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
+/// When, and by how much at most, mm, the slope slowed down within [`ONE_EVENT`] blocks up to `block`: a slope that is read often takes several of
+/// them for it. The block is that by which most of it was over; `None` where it did not slow down.
+fn slowed_down(
+    means: &[f64],
+    block: usize,
+    is_read_over: impl Fn(usize) -> bool,
+) -> Option<(usize, f64)> {
+    let moved = |block: usize| Some(means.get(block)? - means.get(block + 1)?);
+    let newest = moved(block)?;
+    let over = (1..=ONE_EVENT).take_while(|over| is_read_over(*over));
+    let faster = over.filter_map(|over| Some((block + over, moved(block + over)?)));
+    let (top, fastest) = faster.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let by = fastest - newest;
+    let is_over = |block: &usize| moved(*block).is_some_and(|now| fastest - now >= MOST_OF_IT * by);
+    let end = (block..top).rev().find(is_over)?;
+    (by > 0.0).then_some((end, by))
+}
+
 /// The newest of one or two events after which the slope slowed down by far more than ever else: a slide that stopped, a reset, a
 /// few readings that were wrong; and how surely more of them stand out, so that they are usual there. `None` with too few blocks.
 pub(super) fn past_events(
@@ -75,13 +95,15 @@ pub(super) fn past_events(
     if count < FEWEST_CHANGES {
         return None;
     }
-    let at = |block: usize| {
-        let [a, b, c] = [0, 1, 2].map(|next| means[block + next]);
-        (a - b) - (b - c)
+    let moved = |block: usize| means[block] - means[block + 1];
+    let is_read = |block: usize, over: usize| {
+        let between = is_read.get(block..block + over + 2);
+        between.is_some_and(|between| between.iter().all(|is| *is))
     };
-    let read = (1..count).filter(|block| is_read[*block..block + 3].iter().all(|is| *is));
-    let changes: Vec<(usize, f64)> = read.map(|block| (block, at(block))).collect();
-    let mut sizes: Vec<f64> = changes.iter().map(|(_, change)| change.abs()).collect();
+    let read = (1..count).filter(|block| is_read(*block, 1));
+    let mut sizes: Vec<f64> = read
+        .map(|block| (moved(block) - moved(block + 1)).abs())
+        .collect();
     if sizes.len() < FEWEST_CHANGES {
         return None;
     }
@@ -89,9 +111,8 @@ pub(super) fn past_events(
     if median < LEAST_CHANGE_MM {
         return None;
     }
-    let slow: Vec<(usize, f64)> = (changes.iter())
-        .filter(|(_, change)| *change < 0.0)
-        .map(|(block, change)| (*block, -change))
+    let slow: Vec<(usize, f64)> = (1..count)
+        .filter_map(|block| slowed_down(means, block, |over| is_read(block, over)))
         .collect();
     let largest = largest_events(&slow, ONE_EVENT.max(count / EVENTS));
     let least = OUTSTANDING * median / NORMAL_MEDIAN;

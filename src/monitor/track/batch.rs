@@ -4,7 +4,7 @@
 use super::{Phase, Prepared, StepContext, Track, days};
 use crate::alert::{Level, Policy, to_the_next_reading};
 use crate::fit::Observations;
-use crate::forecast::{Indicators, without_excursions};
+use crate::forecast::{Indicators, of_motion};
 use crate::monitor::event::Event;
 use crate::monitor::history::{MeasuredAs, Taken};
 use crate::reading::{Reading, Timestamp};
@@ -53,7 +53,7 @@ impl Track {
         {
             return false;
         }
-        Indicators::of(&without_excursions(observations)).is_some_and(|shown| {
+        Indicators::of(&of_motion(observations)).is_some_and(|shown| {
             let red = to_the_next_reading(policy.red_within(), shown.interval_days());
             !shown.may_reach(days(red), policy.red_chance)
                 && !shown.may_reach(days(policy.outlook), policy.orange_chance)

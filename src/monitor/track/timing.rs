@@ -42,7 +42,7 @@ impl Track {
         let is_due = |due: Timestamp| due <= until;
         let mut events = Vec::new();
         if self.alarm.overdue_at(&self.record).is_some_and(is_due) {
-            events.extend(self.alarm.judge_overdue(&self.record, policy, now));
+            events.extend(self.alarm.judge_overdue(&self.record, policy, (now, until)));
         }
         if self.is_silent_by(until) {
             let level = self.level();

@@ -213,6 +213,25 @@ impl Site {
         events
     }
 
+    /// Judges what is due by `until` if no reading comes, which it may be at the site; data time stays where it is.
+    fn judge_by(&mut self, until: Timestamp) -> Vec<Event> {
+        let mut events = Vec::new();
+        let Some(now) = self.now.filter(|_| self.sinks.store.is_some()) else {
+            return events;
+        };
+        for _ in 0..MOST_TICKS {
+            let Some(due) = self.monitor.next_deadline().filter(|due| *due <= until) else {
+                break;
+            };
+            events.extend(self.step(now, &Input::Notice(Notice::Passed { until: due })));
+            if self.monitor.next_deadline().is_some_and(|next| next <= due) {
+                tracing::error!(%due, "the monitor's deadline does not move on");
+                break;
+            }
+        }
+        events
+    }
+
     /// Takes an order of people, once also where the state still has it. It is not of alerts that were called after it was given.
     ///
     /// # Errors

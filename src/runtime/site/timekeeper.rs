@@ -16,6 +16,8 @@ const STEADY: usize = 4;
 /// As far apart: by this share of the time between them, and by so much in any case.
 const APART: f64 = 0.25;
 const LEAST_APART: Duration = Duration::from_secs(60);
+/// What comes together comes within this time.
+const LULL: Duration = Duration::from_secs(20);
 
 /// What is known of the time.
 #[derive(Debug, Default)]
@@ -24,6 +26,8 @@ pub(super) struct Timekeeper {
     known: Option<(Timestamp, Stopwatch)>,
     /// Whether that reading came in live.
     is_live: bool,
+    /// How long ago the newest live one came.
+    came: Option<Stopwatch>,
     /// Whether live readings have shown that they come when they are measured, and none of them is one of a backlog.
     is_proven: bool,
     /// Of each benchmark the latest live readings that lie far behind the clock, and how long ago they came.
@@ -65,6 +69,7 @@ impl Timekeeper {
             self.known = Some((known, now));
         }
         self.is_live |= is_live;
+        self.came = if is_live { Some(now) } else { self.came };
     }
 
     /// The newest known time and what has passed since.
@@ -118,6 +123,13 @@ impl Timekeeper {
     pub(super) fn latest(&self, wall: Timestamp) -> Timestamp {
         let now = self.now(wall);
         if self.is_proven { now } else { now.max(wall) }
+    }
+
+    /// The host's clock, which says `wall`, where it is far ahead of live readings that may be a backlog as well as right, and none has come of
+    /// late: silences are judged by it.
+    pub(super) fn in_doubt(&self, wall: Timestamp) -> Option<Timestamp> {
+        let is_lull = self.came?.elapsed() >= LULL;
+        (is_lull && self.latest(wall) > self.now(wall)).then_some(wall)
     }
 
     /// A reading of `benchmark` and `time` lies beyond what the clock allows, and is held. Whether those of this
@@ -188,6 +200,20 @@ mod tests {
         assert!(keeper.is_behind(now - 2.hours()));
         assert_eq!(keeper.now(now - 2.hours()), now);
         assert!(!keeper.is_behind(now));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn what_came_far_behind_the_clock_is_in_doubt_once_no_more_comes_until_it_is_proven() {
+        let (mut keeper, wall) = (Timekeeper::default(), noon() + 1000.hours());
+        for hour in 0..6 {
+            keeper.knows(noon() + hour.hours(), true);
+            keeper.comes("5", noon() + hour.hours(), wall + hour.hours());
+            assert_eq!(keeper.in_doubt(wall + hour.hours()), None, "{hour}");
+            tokio::time::advance(Duration::from_secs(3600)).await;
+            let later = wall + (hour + 1).hours();
+            let doubt = (hour < 3).then_some(later);
+            assert_eq!(keeper.in_doubt(later), doubt, "{hour}");
+        }
     }
 
     #[tokio::test(start_paused = true)]

@@ -2,7 +2,7 @@
 
 use super::{Alarm, BesideForecast};
 use crate::alert::{
-    AlertCause, AlertEvidence, Entered, Policy, Transition, chance_in_words, hours_in_words,
+    AlertCause, AlertEvidence, Entered, Level, Policy, Transition, chance_in_words, hours_in_words,
 };
 use crate::forecast::HORIZON_DAYS;
 use crate::monitor::event::{AlertState, CalledLevel, Event, EventKind, LevelChance};
@@ -55,6 +55,7 @@ impl Alarm {
             let outlook = forecast.in_force(days(policy.outlook));
             outlook.collapse.quantile(EARLY, HORIZON_DAYS)
         });
+        evidence.was_red = self.was_red(policy, time);
         self.held.update(policy, &mut evidence);
         for event in refit {
             if let EventKind::Refit { called, .. } = &mut event.kind {
@@ -68,6 +69,12 @@ impl Alarm {
             .map(|change| alert_event(record, time, policy, &evidence, ahead, change));
         events.extend(reported);
         events
+    }
+
+    /// Whether red was in force of late, before `time`.
+    fn was_red(&self, policy: &Policy, time: Timestamp) -> bool {
+        let since = time.saturating_sub(policy.red_of_late());
+        since.is_ok_and(|since| self.levels.highest_since(since) == Level::Red)
     }
 
     /// What the evidence calls for by itself; `None` without a forecast.

@@ -88,18 +88,18 @@ impl Alarm {
         Some(record.put_off(newest, due))
     }
 
-    /// Red, where `now` has come to when it is due without a reading.
+    /// Red at `now`, where `until` has come to when it is due without a reading.
     pub(in crate::monitor::track) fn judge_overdue(
         &mut self,
         record: &BenchmarkRecord,
         policy: &Policy,
-        now: Timestamp,
+        (now, until): (Timestamp, Timestamp),
     ) -> Option<Event> {
-        self.overdue_at(record).filter(|due| *due <= now)?;
+        self.overdue_at(record).filter(|due| *due <= until)?;
         let (newest, overdue) = (read_last(record)?, self.overdue.take()?);
         let chance = overdue
             .chances
-            .chance_within(now, days(policy.red_within()));
+            .chance_within(until, days(policy.red_within()));
         let evidence = AlertEvidence {
             now,
             chance_for_red: Some(chance),

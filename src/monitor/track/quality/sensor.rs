@@ -157,8 +157,8 @@ impl DataQuality {
         };
         let latched = match level {
             Level::Green | Level::Unknown => String::new(),
-            level @ (Level::Yellow | Level::Orange | Level::Red) => {
-                format!("; {level} stays in force")
+            Level::Yellow | Level::Orange | Level::Red => {
+                "; the level in force stays in force".to_owned()
             }
         };
         let fault = fault.map_or_else(String::new, |what| format!("; the sensor gives {what}"));
