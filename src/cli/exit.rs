@@ -7,7 +7,7 @@ use crate::runtime::ingest::IngestError;
 use crate::runtime::pulse::ReportingError;
 use crate::runtime::replay::ReplayError;
 use crate::runtime::run::RunError;
-use crate::runtime::sandbox::SandboxError;
+use crate::runtime::sandbox::{CANNOT_RUN, SandboxError};
 use crate::store::StoreError;
 use std::error::Error;
 use std::fmt::Display;
@@ -26,8 +26,6 @@ const UNAVAILABLE: u8 = 69;
 const IO: u8 = 74;
 /// The config is wrong.
 const CONFIG: u8 = 78;
-/// A hook cannot be run; the shell's code for it.
-const NOT_RUN: u8 = 126;
 
 /// What the process of another user ended with; it has said why.
 #[derive(Debug, thiserror::Error)]
@@ -93,7 +91,7 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
         (error.is::<SelectError>() || error.is::<MergeError>(), DATA),
         (error.is::<NoSuchReadings>(), DATA),
         (error.is::<ConfigError>(), CONFIG),
-        (error.is::<SandboxError>(), NOT_RUN),
+        (error.is::<SandboxError>(), CANNOT_RUN),
         (error.is::<io::Error>() || error.is::<StoreError>(), IO),
     ];
     table.into_iter().find_map(|(is, code)| is.then_some(code))

@@ -38,6 +38,9 @@ pub enum Walls {
     Missing,
 }
 
+/// A hook cannot be run: what the process ends with that was to run it, as a shell does.
+pub const CANNOT_RUN: u8 = 126;
+
 /// Why a hook could not be walled in or started.
 #[derive(Debug, thiserror::Error)]
 pub enum SandboxError {

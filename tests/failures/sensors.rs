@@ -4,6 +4,7 @@ use crate::site::{Program, Site, eventually, get};
 use crate::telling::failing;
 use jiff::SignedDuration;
 use slipwatch::runtime::clock;
+use std::time::Duration;
 
 const HEADER: &str = "time,displacement_mm\n";
 const POLICY: &str = "[alert]\nevacuation_time = \"3h\"\n";
@@ -193,6 +194,31 @@ fn a_benchmark_that_reads_again_with_a_backlog_is_unknown_nowhere() {
     program.stop();
     let program = site.caught_up();
     assert!(is_known(), "{}", status());
+    program.stop();
+    site.proven_events();
+}
+
+/// A file that is copied into a running daemon while it is written: nothing else shows what time it is.
+#[test]
+fn what_is_written_into_a_running_daemon_and_ends_days_ago_is_unknown() {
+    let site = Site::new("");
+    let start = clock::now() - SignedDuration::from_hours(300);
+    let row = |hour: i64| {
+        let moved = 0.1 * hour as f64 + 0.05 * (1.7 * hour as f64).sin();
+        format!("{},{moved:.3}\n", start + SignedDuration::from_hours(hour))
+    };
+    let program = site.caught_up();
+    site.append("incoming/5.csv", HEADER);
+    for first in (0..200).step_by(20) {
+        let block: String = (first..first + 20).map(row).collect();
+        site.append("incoming/5.csv", &block);
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    eventually("all of it", || site.values().len() == 200);
+    eventually("unknown", || site.notified("5/unknown/", "firing") == 1);
+    let rest: String = (200..300).map(row).collect();
+    site.append("incoming/5.csv", &rest);
+    eventually("its end", || site.notified("5/unknown/", "resolved") == 1);
     program.stop();
     site.proven_events();
 }

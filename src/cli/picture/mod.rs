@@ -1,5 +1,6 @@
 //! A figure as a file: SVG as it was drawn, or PNG.
 
+use super::exit::UsageError;
 use anyhow::Context;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
@@ -14,10 +15,23 @@ const FONTS: [&[u8]; 2] = [
     include_bytes!("fonts/DejaVuSans-Bold.ttf"),
 ];
 
+/// Endings of pictures that are not written.
+const OTHERS: [&str; 9] = [
+    "pdf", "jpg", "jpeg", "gif", "webp", "tif", "tiff", "eps", "ps",
+];
+
 /// Writes the figure as PNG where the file's name ends in `.png`, else as the SVG that it is.
 pub(super) fn write(file: &Path, svg: &str) -> anyhow::Result<()> {
-    let is_png = (file.extension()).is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
-    let bytes = if is_png {
+    let ends_in =
+        |name: &str| (file.extension()).is_some_and(|ending| ending.eq_ignore_ascii_case(name));
+    if OTHERS.into_iter().any(ends_in) {
+        let text = format!(
+            "{}: figures are written as SVG or PNG, expected a name that ends in .svg or .png",
+            file.display()
+        );
+        anyhow::bail!(UsageError(text));
+    }
+    let bytes = if ends_in("png") {
         png(svg)?
     } else {
         svg.as_bytes().to_vec()

@@ -100,6 +100,12 @@ pub fn convert(
         "{}: packed files are read and not written, expected a name without .gz",
         output.display()
     );
+    let is_same = input.canonicalize().ok().zip(output.canonicalize().ok());
+    anyhow::ensure!(
+        is_same.is_none_or(|(input, output)| input != output),
+        "{}: it is what is read, expected another file to write: what the other format has no place for would be lost",
+        output.display()
+    );
     let read = read_watched(&[input.to_owned()], options, &mut |share| {
         progress(ConvertStage::Read(share));
     })?;
