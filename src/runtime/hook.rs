@@ -245,10 +245,12 @@ impl Alert {
         let benchmark = self.event.benchmark.as_ref();
         let count = self.many.as_ref().map_or(1, |many| many.members.len());
         let optional_time = self.failure_time.map(|time| time.to_string());
-        let (rule, text) = match &self.event.kind {
-            EventKind::Alert { rule, text, .. } => (rule.clone(), text.clone()),
-            EventKind::Correction { text, .. } => (String::new(), text.clone()),
-            _ => (String::new(), String::new()),
+        let (rule, text) = if let EventKind::Alert { rule, text, .. } = &self.event.kind {
+            (rule.clone(), text.clone())
+        } else if let EventKind::Correction { text, .. } = &self.event.kind {
+            (String::new(), text.clone())
+        } else {
+            (String::new(), String::new())
         };
         [
             ("SLIPWATCH_EVENT", self.event.kind.name().to_owned()),
@@ -391,13 +393,11 @@ pub(super) async fn run_program(
     }
     let (stdout, stderr) = tokio::join!(finish(stdout), finish(stderr));
     tracing::info!(hook = ?hook.run, key = alert.key, attempt, ?outcome, stdout, stderr, "hook ended");
-    match outcome {
-        // What was to run it has said why it cannot.
-        HookOutcome::Failed(code) if code == i32::from(CANNOT_RUN) && !stderr.is_empty() => {
-            let last = stderr.lines().next_back().unwrap_or(&stderr);
-            HookOutcome::NotStarted(last.to_owned())
-        }
-        outcome => outcome,
+    // What was to run it has said why it cannot.
+    let cannot_run = outcome == HookOutcome::Failed(i32::from(CANNOT_RUN));
+    match stderr.lines().next_back().filter(|_| cannot_run) {
+        Some(why) => HookOutcome::NotStarted(why.to_owned()),
+        None => outcome,
     }
 }
 
