@@ -11,7 +11,7 @@ use super::evidence::{self, Evidence};
 use super::learned::LEARNED;
 use super::members::{LONGEST_DAYS, MOST, Members};
 use super::network::{INPUTS, Network};
-use super::{Passage, Scale, Scales};
+use super::{Passage, PastEvent, Scale, Scales};
 use crate::fit::Observations;
 
 /// Spans beyond the longest scale that are still asked for.
@@ -90,7 +90,8 @@ impl Indicators {
             let later = newest(observations, event.days)?;
             let scales = Scales::at(&later, later.values.len())?;
             let later = Self::by(&later, scales);
-            Some((LATER * event.share, Box::new(later)))
+            let share = LATER * event.share * as_fast_as(&event, &whole.scales);
+            Some((share, Box::new(later)))
         });
         Some(whole)
     }
@@ -221,6 +222,18 @@ impl Indicators {
         inputs.push((0.2 * shown).clamp(-MOST, MOST));
         inputs
     }
+}
+
+/// The root of how fast the slope is now beside what it was in an event that it survived, at most 1: by blocks no longer than those in which the event was found,
+/// and less the error of each. What is slower than a surge that stopped is mostly another one of its kind.
+fn as_fast_as(event: &PastEvent, scales: &Scales) -> f64 {
+    let each = scales.each.iter();
+    let shorter = each.take_while(|scale| scale.days <= event.block_days);
+    let now = shorter.map(|scale| scale.velocity - error(scale));
+    let fastest = now.fold(0.0, f64::max);
+    (fastest / event.velocity.max(f64::MIN_POSITIVE))
+        .min(1.0)
+        .sqrt()
 }
 
 /// The newest readings, of the last `days`; `None` where these are too few to show by themselves what is usual.

@@ -17,8 +17,8 @@ const FEWEST_AFTER: usize = 4;
 const FEWEST_BEFORE: usize = 12;
 const MOST: usize = 24;
 /// Alike: after it the slope moved no farther than before, but for so many standard errors and this share of the jump.
-const ALIKE: f64 = 3.0;
-const SHARE: f64 = 0.25;
+const ALIKE: f64 = 5.0;
+const SHARE: f64 = 0.4;
 
 /// The observations without such a jump: those before it are moved by it.
 pub(super) fn without_isolated_step(observations: Cow<'_, Observations>) -> Cow<'_, Observations> {
@@ -32,7 +32,7 @@ pub(super) fn without_isolated_step(observations: Cow<'_, Observations>) -> Cow<
     Cow::Owned(moved)
 }
 
-/// Before which reading the slope jumped, and how far, mm, beyond what it moves.
+/// Before which reading the slope jumped, and how much of that, mm, is to be taken off.
 fn isolated_step(observations: &Observations) -> Option<(usize, f64)> {
     let values = &observations.values;
     if observations.quantity != Quantity::Displacement {
@@ -59,7 +59,9 @@ fn isolated_step(observations: &Observations) -> Option<(usize, f64)> {
     let (first, last) = (after.first()?, after.last()?);
     let moved = last.value - first.value - usual * (last.t_days - first.t_days);
     let most = (ALIKE * std::f64::consts::SQRT_2 * sigma).min(SHARE * jump.abs());
-    (moved.abs() <= most).then_some((at, jump))
+    // From one reading to the next the chance should not come and go: less of a jump is taken off, the less alike the motion is.
+    let share = (2.5 * (1.0 - moved.abs() / most)).min(1.0);
+    (share > 0.0).then_some((at, share * jump))
 }
 
 /// The velocity of some readings, mm/day: the median of those over half of them.

@@ -25,6 +25,10 @@ pub struct PastEvent {
     /// How surely it stands out of all else, above 0 and at most 1: blocks move along with the newest reading, and a limit would be
     /// passed back and forth.
     pub share: f64,
+    /// How fast the slope was, mm/day, as the mean over blocks of [`PastEvent::block_days`].
+    pub velocity: f64,
+    /// Days.
+    pub block_days: f64,
 }
 
 impl PastEvent {
@@ -33,9 +37,14 @@ impl PastEvent {
     pub(super) fn newest(found: &[Self], usual: f64) -> Option<Self> {
         let most = found.iter().map(|event| event.share).fold(0.0, f64::max);
         let sure = found.iter().filter(|event| event.share >= 0.5 * most);
-        let days = sure.map(|event| event.days).reduce(f64::min)?;
+        let newest = sure.clone().min_by(|a, b| a.days.total_cmp(&b.days))?;
+        let fastest = sure.max_by(|a, b| a.velocity.total_cmp(&b.velocity))?;
         let share = most * (1.0 - usual);
-        (share > 0.0).then_some(Self { days, share })
+        (share > 0.0).then_some(Self {
+            days: newest.days,
+            share,
+            ..*fastest
+        })
     }
 }
 
@@ -44,17 +53,30 @@ fn nearly(ratio: f64) -> f64 {
     (1.0 + ratio.log2()).clamp(0.0, 1.0)
 }
 
-/// The largest of these (block, slow-down), largest first, each further than `apart` blocks from the larger ones.
-fn largest_events(slow: &[(usize, f64)], apart: usize) -> [f64; MOST_EVENTS + 1] {
+/// A slope that slows down.
+#[derive(Debug, Clone, Copy)]
+struct SlowDown {
+    /// By which most of it was over.
+    block: usize,
+    /// Of the motion of a block, mm.
+    by: f64,
+    /// The motion of the fastest block before, mm.
+    fastest: f64,
+}
+
+/// The sizes of the largest of these, largest first, each further than `apart` blocks from the larger ones.
+fn largest_events(slow: &[SlowDown], apart: usize) -> [f64; MOST_EVENTS + 1] {
     let mut largest = [0.0; MOST_EVENTS + 1];
     let mut places: Vec<usize> = Vec::new();
     for event in &mut largest {
-        let others = slow
-            .iter()
-            .filter(|(block, _)| places.iter().all(|place| block.abs_diff(*place) > apart));
-        if let Some((block, size)) = others.max_by(|a, b| a.1.total_cmp(&b.1)) {
-            places.push(*block);
-            *event = *size;
+        let others = (slow.iter()).filter(|one| {
+            places
+                .iter()
+                .all(|place| one.block.abs_diff(*place) > apart)
+        });
+        if let Some(one) = others.max_by(|a, b| a.by.total_cmp(&b.by)) {
+            places.push(one.block);
+            *event = one.by;
         }
     }
     largest
@@ -72,7 +94,7 @@ fn slowed_down(
     means: &[f64],
     block: usize,
     is_read_over: impl Fn(usize) -> bool,
-) -> Option<(usize, f64)> {
+) -> Option<SlowDown> {
     let moved = |block: usize| Some(means.get(block)? - means.get(block + 1)?);
     let newest = moved(block)?;
     let over = (1..=ONE_EVENT).take_while(|over| is_read_over(*over));
@@ -81,7 +103,11 @@ fn slowed_down(
     let by = fastest - newest;
     let is_over = |block: &usize| moved(*block).is_some_and(|now| fastest - now >= MOST_OF_IT * by);
     let end = (block..top).rev().find(is_over)?;
-    (by > 0.0).then_some((end, by))
+    (by > 0.0).then_some(SlowDown {
+        block: end,
+        by,
+        fastest,
+    })
 }
 
 /// The newest of one or two events after which the slope slowed down by far more than ever else: a slide that stopped, a reset, a
@@ -111,16 +137,18 @@ pub(super) fn past_events(
     if median < LEAST_CHANGE_MM {
         return None;
     }
-    let slow: Vec<(usize, f64)> = (1..count)
+    let slow: Vec<SlowDown> = (1..count)
         .filter_map(|block| slowed_down(means, block, |over| is_read(block, over)))
         .collect();
     let largest = largest_events(&slow, ONE_EVENT.max(count / EVENTS));
     let least = OUTSTANDING * median / NORMAL_MEDIAN;
     let next = largest[MOST_EVENTS];
     let share = |size: f64| nearly(size / least.max(ABOVE_NEXT * next));
-    let events = slow.iter().map(|(block, size)| PastEvent {
-        days: (*block - 1) as f64 * days,
-        share: share(*size),
+    let events = slow.iter().map(|slow| PastEvent {
+        days: (slow.block - 1) as f64 * days,
+        share: share(slow.by),
+        velocity: slow.fastest / days,
+        block_days: days,
     });
     let events: Vec<PastEvent> = events.filter(|event| event.share > 0.0).collect();
     Some((PastEvent::newest(&events, 0.0), nearly(0.5 * next / least)))
