@@ -47,6 +47,16 @@ impl Policy {
                 "settled velocity of {} mm/day or more",
                 self.critical_velocity_mm_per_day
             ),
+            (RED_CHANCE, Level::Orange) => format!(
+                "chance of collapse of {} or more within {} ({}) and until the next reading, which calls red, and of {} or more, but \
+                 not yet of {}, in the mean over some {}",
+                self.red_chance,
+                self.red_within_in_words(),
+                hours_in_words(self.red_within()),
+                rounded(self.red_near_chance()),
+                rounded(self.red_mean_chance()),
+                hours_in_words(self.red_course())
+            ),
             (RED_CHANCE, _) => format!(
                 "chance of collapse of {} or more within {} ({}) and until the next reading, and of {} or more in the mean over \
                  some {}, or of {} at one reading",

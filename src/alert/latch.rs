@@ -237,7 +237,9 @@ impl Latch {
         // Motion that never stood out of its error has not to slow down.
         let is_slow = self.has_slowed_to(velocity, error) || self.peak_velocity <= 0.0;
         // Many a slope pauses before it collapses: while the chance within the outlook calls orange red is not over because it has.
-        let pauses = self.level == Level::Red && call.level == Level::Orange;
+        let outlook = evidence.chance_within_outlook;
+        let is_likely = outlook.is_some_and(|chance| chance >= policy.orange_chance);
+        let pauses = self.level == Level::Red && is_likely;
         let slowed = less && is_slow && !pauses;
         // A slope that has become faster since the level was called is not over it while more than nothing is called.
         let is_no_faster = velocity <= STEADY_GAIN * self.first_velocity + CLEAR * error;

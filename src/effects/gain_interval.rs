@@ -20,7 +20,7 @@ const MOST_GAINS: usize = 6;
 /// By so much of its ln a delay is moved to see what that changes, and the most that it is moved to the best one at a gain.
 const NUDGE: f64 = 0.15;
 const FARTHEST: f64 = 0.45;
-/// A bound is looked for no farther than so many times as far as the straight line has it, and no nearer than at one over that.
+/// A bound is looked for no farther than so many times as far as the straight line has it.
 const UNLIKE: f64 = 8.0;
 
 /// The misfit over the gain of one covariate, whose term is the last.
@@ -88,8 +88,8 @@ fn deviation(
 }
 
 impl GainProfile<'_> {
-    /// The gain on the side of `by` at which the misfit has grown by [`DROP`], which the straight line has at `gain + by`; the farthest one that is
-    /// no worse, where none was tried that is.
+    /// The gain on the side of `by` at which the misfit has grown by [`DROP`], which the straight line has at `gain + by`; `None` where
+    /// none was tried at which it has.
     fn bound(&self, gain: f64, by: f64, scratch: &mut Scratch) -> Option<f64> {
         let (mut inside, mut outside) = ((0.0, 0.0), None::<(f64, f64)>);
         let mut nearest = self.start.clone();

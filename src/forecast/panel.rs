@@ -2,7 +2,7 @@
 //! load averaged over its shapes and its starts, the regime and the passage of a critical velocity.
 
 use super::excursions::without_excursions;
-use super::isolated_step::without_isolated_step;
+use super::isolated_step::without_isolated_steps;
 use super::surprise::Surprise;
 use super::{Indicators, Members, Passage};
 use crate::fit::{Ensemble, LoadPosterior, Observation, Observations, Rate, RateOptions};
@@ -154,7 +154,7 @@ impl LawForecaster {
 
 /// `observations` without what is no motion of a slope.
 pub(crate) fn of_motion(observations: &Observations) -> Cow<'_, Observations> {
-    without_isolated_step(without_excursions(observations))
+    without_isolated_steps(without_excursions(observations))
 }
 
 /// What `observations` give by themselves, with `critical` in mm/day, and the laws they leave open; `None` with too few

@@ -198,6 +198,9 @@ pub enum EventKind {
     Summary(Summary),
 }
 
+/// The rule by which what is in force ends at a benchmark that is no longer watched.
+pub const REMOVED: &str = "removed";
+
 /// What the keys of alerts of the whole site begin with.
 pub(super) const SITE: &str = "site";
 /// How the kind of a fault begins that says a suspicion of readings, and how that of its end ends.

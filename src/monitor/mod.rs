@@ -41,8 +41,8 @@ pub use course::{LevelStretch, by_time, levels_in};
 pub use declared::{Declaration, Declared};
 pub use event::{
     AlertState, CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime, InverseVelocity,
-    LevelChance, Plain, RESET_FOUND, RegimeReport, SUSPECT, SUSPECT_ENDS, SharedFailure, Summary,
-    Unexplained,
+    LevelChance, Plain, REMOVED, RESET_FOUND, RegimeReport, SUSPECT, SUSPECT_ENDS, SharedFailure,
+    Summary, Unexplained,
 };
 pub use event_shown::KindShown;
 pub use given::{Given, OrderKind, OrderedBy};
@@ -270,7 +270,7 @@ impl Monitor {
             Input::Settings(settings) => self.change_settings(now, settings),
             Input::Order(order) => self.take_order(now, order),
             Input::Trouble { kind, text } => vec![trouble(now, kind, text)],
-            Input::Tick => self.pass(now, now),
+            Input::Tick => self.pass(now, now, false),
         };
         self.benchmarks.note_levels(input, &events);
         let of_site = self.site_levels(now, input, &events);
@@ -319,13 +319,17 @@ impl Monitor {
         events
     }
 
-    /// Judges the benchmarks that were due by `until`, at `now`.
-    fn pass(&mut self, now: Timestamp, until: Timestamp) -> Vec<Event> {
+    /// Judges the benchmarks that were due by `until`, at `now`: whether they are silent, and, unless `silences_alone`, whether a collapse that was
+    /// forecast calls red.
+    fn pass(&mut self, now: Timestamp, until: Timestamp, silences_alone: bool) -> Vec<Event> {
         let mut events = Vec::new();
         for id in self.benchmarks.due(until) {
             if let Some(track) = self.benchmarks.get_mut(&id) {
                 let policy = self.settings.policy(&id);
-                events.extend(track.pass(policy, (now, until), self.outages.sensor_fault(&id)));
+                if !silences_alone {
+                    events.extend(track.judge_overdue(policy, (now, until)));
+                }
+                events.extend(track.pass((now, until), self.outages.sensor_fault(&id)));
             }
             self.benchmarks.note_changed(&id);
         }
@@ -386,6 +390,13 @@ impl Monitor {
     /// What it goes by.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// Whether a benchmark falls silent by `until`, if no reading comes.
+    pub(crate) fn falls_silent_by(&self, until: Timestamp) -> bool {
+        let due = self.benchmarks.due(until);
+        due.iter()
+            .any(|id| (self.benchmarks.get(id)).is_some_and(|track| track.is_silent_by(until)))
     }
 
     /// When the monitor wants a [`Input::Tick`] if nothing else comes before.

@@ -75,6 +75,9 @@ pub enum Notice {
     Passed {
         /// What time it is.
         until: Timestamp,
+        /// Whether nothing else is judged than which benchmarks are silent.
+        #[serde(default)]
+        silences_alone: bool,
     },
     /// The host's clock is wrong: readings that are known lie after it, or it has gone ahead of the time that ran since.
     ClockWrong {
@@ -91,11 +94,7 @@ pub enum Notice {
 impl Monitor {
     pub(super) fn take_notice(&mut self, now: Timestamp, notice: &Notice) -> Vec<Event> {
         match notice {
-            Notice::Watching => {
-                let silent = self.never_read();
-                let each = silent.iter().map(|id| self.outages.begin_awaiting(now, id));
-                each.flatten().collect()
-            }
+            Notice::Watching => self.await_unread(now),
             Notice::InBatches => {
                 self.batches.begin();
                 Vec::new()
@@ -146,7 +145,10 @@ impl Monitor {
                 self.benchmarks.note_changed(benchmark);
                 events
             }
-            Notice::Passed { until } => self.pass(now, *until),
+            Notice::Passed {
+                until,
+                silences_alone,
+            } => self.pass(now, *until, *silences_alone),
             Notice::ClockWrong { text } => {
                 let since = self.outages.begin_clock_wrong(now);
                 clock_fault(now, since, AlertState::Firing, text)
@@ -158,6 +160,12 @@ impl Monitor {
                     clock_fault(now, since, AlertState::Resolved, text)
                 }),
         }
+    }
+
+    fn await_unread(&mut self, now: Timestamp) -> Vec<Event> {
+        let unread = self.never_read();
+        let each = unread.iter().map(|id| self.outages.begin_awaiting(now, id));
+        each.flatten().collect()
     }
 
     fn never_read(&self) -> Vec<BenchmarkId> {

@@ -3,7 +3,9 @@
 
 use super::standing::{TakenOrders, every};
 use crate::alert::Level;
-use crate::monitor::{AlertState, CalledLevel, Declared, Event, EventKind, OrderKind, by_time};
+use crate::monitor::{
+    AlertState, CalledLevel, Declared, Event, EventKind, OrderKind, REMOVED, by_time,
+};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Store, StoreError};
 use schemars::JsonSchema;
@@ -264,10 +266,14 @@ fn take_unknown(unknown: &mut BTreeMap<Option<BenchmarkId>, Event>, event: Event
 
 /// Takes one alert event of another level.
 fn take(newest: &mut BTreeMap<Option<BenchmarkId>, NewestAlert>, event: Event) {
-    let EventKind::Alert { state, .. } = &event.kind else {
+    let EventKind::Alert { state, rule, .. } = &event.kind else {
         return;
     };
     match state {
+        // Nobody is to acknowledge what is no longer watched.
+        AlertState::Resolved if rule == REMOVED => {
+            newest.remove(&event.benchmark);
+        }
         AlertState::Firing => {
             let one = NewestAlert {
                 has_ended: false,

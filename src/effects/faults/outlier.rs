@@ -1,4 +1,4 @@
-//! One or two readings far from their neighbours that come back: a mistake, not a motion.
+//! A few readings far from their neighbours that come back: a mistake, not a motion.
 
 use super::nature::Nature;
 use super::trace::{Trace, resolution};
@@ -10,6 +10,9 @@ use std::ops::Range;
 const FEWEST: usize = 20;
 /// Neighbours looked at on either side.
 const BESIDE: usize = 5;
+/// So many one after another may be wrong, as under snow, or while somebody works at the instrument; of covariates, which change in earnest, fewer.
+const TOGETHER: usize = 6;
+const TOGETHER_IN_CHANNEL: usize = 2;
 /// Readings that must follow: what the newest means nobody can know yet.
 const AFTER: usize = 2;
 /// Standard deviations about the line through the neighbours.
@@ -33,13 +36,13 @@ const FEW: f64 = 0.02;
 ///
 /// The error of a velocity grows with it, so velocities must stand out by their logarithms too.
 pub(super) fn outlying_readings(trace: &Trace, quantity: Quantity) -> Vec<bool> {
-    let mut wrong = outlying(trace, FAR);
+    let mut wrong = outlying(trace, FAR, TOGETHER);
     if quantity == Quantity::Velocity && trace.values.iter().all(|value| *value > 0.0) {
         let mut logarithms = trace.clone();
         for value in &mut logarithms.values {
             *value = value.ln();
         }
-        let by_factor = outlying(&logarithms, FAR);
+        let by_factor = outlying(&logarithms, FAR, TOGETHER);
         for (wrong, by_factor) in wrong.iter_mut().zip(by_factor) {
             *wrong &= by_factor;
         }
@@ -71,7 +74,7 @@ pub(super) fn newest_alone(trace: &Trace) -> Option<f64> {
 /// leave the range of all others by more than that range's width; smaller peaks may be weather, and
 /// those of rain and of rivers always are.
 pub(super) fn outlying_samples(trace: &Trace, nature: Nature) -> Vec<bool> {
-    let mut wrong = outlying(trace, FAR_IN_CHANNEL);
+    let mut wrong = outlying(trace, FAR_IN_CHANNEL, TOGETHER_IN_CHANNEL);
     if nature.has_peaks() {
         wrong.fill(false);
         return wrong;
@@ -93,7 +96,7 @@ pub(super) fn outlying_samples(trace: &Trace, nature: Nature) -> Vec<bool> {
     wrong
 }
 
-fn outlying(trace: &Trace, far: f64) -> Vec<bool> {
+fn outlying(trace: &Trace, far: f64, together: usize) -> Vec<bool> {
     let count = trace.len();
     let mut wrong = vec![false; count];
     if count < FEWEST {
@@ -101,7 +104,7 @@ fn outlying(trace: &Trace, far: f64) -> Vec<bool> {
     }
     let usual = usual_deviation(trace);
     let gap = GAP * median(&trace.intervals());
-    for width in [1, 2] {
+    for width in 1..=together {
         for start in 1..count.saturating_sub(width + AFTER - 1) {
             let end = start + width;
             let before = trace.days[start] - trace.days[start - 1];
@@ -210,6 +213,27 @@ mod tests {
     use crate::effects::faults::inspect;
     use crate::effects::fixture::{daily, generator, normals, series};
     use crate::reading::Quantity;
+
+    #[test]
+    fn up_to_six_readings_that_leave_and_come_back_are_mistakes_and_more_or_a_way_there_are_not() {
+        let left = |off: &dyn Fn(usize) -> f64| {
+            let days = daily(400);
+            let noise = normals(&mut generator(5), days.len());
+            let values = noise.iter().enumerate();
+            let values = values.map(|(day, noise)| 0.3 * day as f64 + noise + off(day));
+            let readings = series(Quantity::Displacement, &days, &values.collect::<Vec<f64>>());
+            inspect(&readings, &[]).series.readings.len()
+        };
+        let within = |days: std::ops::Range<usize>| {
+            move |day: usize| 30.0 * f64::from(u8::from(days.contains(&day)))
+        };
+        assert_eq!(left(&within(200..205)), 395);
+        assert_eq!(left(&within(200..206)), 394);
+        assert_eq!(left(&within(200..210)), 400);
+        assert_eq!(left(&within(200..400)), 400);
+        let wave = |day: usize| 30.0 * (-(day as f64 - 200.0).powi(2) / 18.0).exp();
+        assert_eq!(left(&wave), 400);
+    }
 
     #[test]
     fn two_of_eighty_readings_may_be_mistakes_and_three_are_heavy_tails() {

@@ -32,28 +32,30 @@ impl Track {
         self.record.put_first_aside(now, time)
     }
 
-    /// Data time has come to `now` without a reading; `fault` is what the sensor gives instead.
-    pub(in crate::monitor) fn pass(
+    /// Red at `now` where, by `until`, a collapse that was forecast calls it without a reading.
+    pub(in crate::monitor) fn judge_overdue(
         &mut self,
         policy: &Policy,
         (now, until): (Timestamp, Timestamp),
+    ) -> Option<Event> {
+        (self.alarm).judge_overdue(&self.record, policy, (now, until))
+    }
+
+    /// Unknown at `now` where, by `until`, no reading has come for too long; `fault` is what the sensor gives instead.
+    pub(in crate::monitor) fn pass(
+        &mut self,
+        (now, until): (Timestamp, Timestamp),
         fault: Option<&str>,
     ) -> Vec<Event> {
-        let is_due = |due: Timestamp| due <= until;
-        let mut events = Vec::new();
-        if self.alarm.overdue_at(&self.record).is_some_and(is_due) {
-            events.extend(self.alarm.judge_overdue(&self.record, policy, (now, until)));
+        if !self.is_silent_by(until) {
+            return Vec::new();
         }
-        if self.is_silent_by(until) {
-            let level = self.level();
-            let silent = (self.quality).fall_silent(&mut self.record, now, fault, level);
-            events.extend(silent);
-        }
-        events
+        let level = self.level();
+        (self.quality).fall_silent(&mut self.record, now, fault, level)
     }
 
     /// Whether it falls silent by `until`, if no reading comes.
-    fn is_silent_by(&self, until: Timestamp) -> bool {
+    pub(in crate::monitor) fn is_silent_by(&self, until: Timestamp) -> bool {
         self.record.silent_at().is_some_and(|due| due <= until)
     }
 

@@ -384,8 +384,8 @@ impl Site {
     pub fn live(&mut self, wall: Timestamp) -> Vec<Event> {
         let now = self.keeper.now(wall);
         let mut events = self.pass_by(now, self.clock(wall));
-        if let Some(until) = self.keeper.in_doubt(wall) {
-            events.extend(self.judge_by(until));
+        if let Some(lull) = self.keeper.in_doubt(wall) {
+            events.extend(self.judge_by(wall, lull));
         }
         events.extend(self.end_silences(now));
         let (is_behind, has_leapt) = (self.keeper.is_behind(wall), self.keeper.has_leapt(wall));

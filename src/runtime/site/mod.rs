@@ -28,7 +28,7 @@ use mute::Mutes;
 use read_times::ReadTimes;
 use returned::Returned;
 use standing::StandingAlerts;
-use timekeeper::Timekeeper;
+use timekeeper::{Lull, Timekeeper};
 use waiting::WaitingReadings;
 
 use crate::monitor::{Event, EventKind, Input, Monitor, Notice, RESET_FOUND, SUSPECT, Settings};
@@ -199,7 +199,7 @@ impl Site {
                 continue;
             }
             let (due, passed) = if clock.is_some_and(|clock| now > clock) {
-                (due, Input::Notice(Notice::Passed { until: due }))
+                (due, passed(due, false))
             } else {
                 (now, Input::Tick)
             };
@@ -213,17 +213,24 @@ impl Site {
         events
     }
 
-    /// Judges what is due by `until` if no reading comes, which it may be at the site; data time stays where it is.
-    fn judge_by(&mut self, until: Timestamp) -> Vec<Event> {
-        let mut events = Vec::new();
+    /// Judges by `until`, which it may be at the site, what is due without a reading; data time stays where it is. After a short time without readings
+    /// only silences: where the clock is wrong, a level called by it would be too.
+    fn judge_by(&mut self, until: Timestamp, lull: Lull) -> Vec<Event> {
         let Some(now) = self.now.filter(|_| self.sinks.store.is_some()) else {
-            return events;
+            return Vec::new();
         };
+        let mut events = self.count_from_waiting(now, until);
+        if lull == Lull::Short {
+            if self.monitor.falls_silent_by(until) {
+                events.extend(self.step(now, &passed(until, true)));
+            }
+            return events;
+        }
         for _ in 0..MOST_TICKS {
             let Some(due) = self.monitor.next_deadline().filter(|due| *due <= until) else {
                 break;
             };
-            events.extend(self.step(now, &Input::Notice(Notice::Passed { until: due })));
+            events.extend(self.step(now, &passed(due, false)));
             if self.monitor.next_deadline().is_some_and(|next| next <= due) {
                 tracing::error!(%due, "the monitor's deadline does not move on");
                 break;
@@ -372,4 +379,11 @@ fn log_suspicions(events: &[Event]) {
             tracing::warn!(kind, "{text}");
         }
     }
+}
+
+fn passed(until: Timestamp, silences_alone: bool) -> Input {
+    Input::Notice(Notice::Passed {
+        until,
+        silences_alone,
+    })
 }

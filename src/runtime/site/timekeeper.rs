@@ -16,8 +16,18 @@ const STEADY: usize = 4;
 /// As far apart: by this share of the time between them, and by so much in any case.
 const APART: f64 = 0.25;
 const LEAST_APART: Duration = Duration::from_secs(60);
-/// What comes together comes within this time.
-const LULL: Duration = Duration::from_secs(20);
+/// What comes together comes within this time; and what comes in blocks, mostly, within the longer one.
+const SHORT_LULL: Duration = Duration::from_secs(20);
+const LONG_LULL: Duration = Duration::from_secs(3600);
+
+/// A time without readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lull {
+    /// More of a block would have come.
+    Short,
+    /// Another block would have come, mostly.
+    Long,
+}
 
 /// What is known of the time.
 #[derive(Debug, Default)]
@@ -125,11 +135,18 @@ impl Timekeeper {
         if self.is_proven { now } else { now.max(wall) }
     }
 
-    /// The host's clock, which says `wall`, where it is far ahead of live readings that may be a backlog as well as right, and none has come of
-    /// late: silences are judged by it.
-    pub(super) fn in_doubt(&self, wall: Timestamp) -> Option<Timestamp> {
-        let is_lull = self.came?.elapsed() >= LULL;
-        (is_lull && self.latest(wall) > self.now(wall)).then_some(wall)
+    /// For how long no reading has come, where the host's clock, which says `wall`, is far ahead of live ones that may be a backlog as well as right:
+    /// what is due without a reading is judged by the clock then. `None` where it is not, or some have just come.
+    pub(super) fn in_doubt(&self, wall: Timestamp) -> Option<Lull> {
+        let since = self.came?.elapsed();
+        let lull = if since < SHORT_LULL {
+            return None;
+        } else if since < LONG_LULL {
+            Lull::Short
+        } else {
+            Lull::Long
+        };
+        (self.latest(wall) > self.now(wall)).then_some(lull)
     }
 
     /// A reading of `benchmark` and `time` lies beyond what the clock allows, and is held. Whether those of this
@@ -209,10 +226,14 @@ mod tests {
             keeper.knows(noon() + hour.hours(), true);
             keeper.comes("5", noon() + hour.hours(), wall + hour.hours());
             assert_eq!(keeper.in_doubt(wall + hour.hours()), None, "{hour}");
-            tokio::time::advance(Duration::from_secs(3600)).await;
+            tokio::time::advance(Duration::from_secs(60)).await;
+            let later = wall + hour.hours() + 1.minute();
+            let short = (hour < 3).then_some(Lull::Short);
+            assert_eq!(keeper.in_doubt(later), short, "{hour}");
+            tokio::time::advance(Duration::from_secs(3540)).await;
             let later = wall + (hour + 1).hours();
-            let doubt = (hour < 3).then_some(later);
-            assert_eq!(keeper.in_doubt(later), doubt, "{hour}");
+            let long = (hour < 3).then_some(Lull::Long);
+            assert_eq!(keeper.in_doubt(later), long, "{hour}");
         }
     }
 

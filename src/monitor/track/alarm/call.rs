@@ -2,7 +2,7 @@
 
 use super::{Alarm, BesideForecast};
 use crate::alert::{
-    AlertCause, AlertEvidence, Entered, Level, Policy, Transition, chance_in_words, hours_in_words,
+    AlertCause, AlertEvidence, Entered, Policy, Transition, chance_in_words, hours_in_words,
 };
 use crate::forecast::HORIZON_DAYS;
 use crate::monitor::event::{AlertState, CalledLevel, Event, EventKind, LevelChance};
@@ -74,7 +74,7 @@ impl Alarm {
     /// Whether red was in force of late, before `time`.
     fn was_red(&self, policy: &Policy, time: Timestamp) -> bool {
         let since = time.saturating_sub(policy.red_of_late());
-        since.is_ok_and(|since| self.levels.highest_since(since) == Level::Red)
+        since.is_ok_and(|since| self.levels.was_red_since(since))
     }
 
     /// What the evidence calls for by itself; `None` without a forecast.

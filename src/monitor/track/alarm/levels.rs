@@ -12,6 +12,9 @@ const MOST_LEVELS: usize = 64;
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(in crate::monitor::track) struct Levels {
     changes: VecDeque<(Timestamp, Level)>,
+    /// Until when levels were called in error, or by readings that meant something else.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    void_until: Option<Timestamp>,
 }
 
 impl Levels {
@@ -34,6 +37,19 @@ impl Levels {
     ) -> impl Iterator<Item = (Timestamp, Level)> {
         let at = self.changes.partition_point(|(time, _)| *time <= since);
         self.changes.iter().skip(at.saturating_sub(1)).copied()
+    }
+
+    /// Those so far say nothing of the slope.
+    pub(super) fn are_void_until(&mut self, now: Timestamp) {
+        self.void_until = Some(now);
+    }
+
+    /// Whether red was in force at `since` or later, and not in error.
+    pub(super) fn was_red_since(&self, since: Timestamp) -> bool {
+        let mut own = self.since(since);
+        own.any(|(from, level)| {
+            level == Level::Red && self.void_until.is_none_or(|void| from > void)
+        })
     }
 
     /// The highest of them.

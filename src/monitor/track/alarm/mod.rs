@@ -11,7 +11,7 @@ use super::forecast::Forecast;
 use super::record::BenchmarkRecord;
 use crate::alert::{AlertCause, AlertEvidence, Held, Latch, Level, Policy};
 use crate::fit::Rate;
-use crate::monitor::event::{AlertState, Event, EventKind};
+use crate::monitor::event::{AlertState, Event, EventKind, REMOVED};
 use crate::monitor::kept::KeptForecast;
 use crate::monitor::motion::observed;
 use crate::reading::Timestamp;
@@ -192,6 +192,9 @@ impl Alarm {
     pub(super) fn follow_on(&mut self, former: Self) {
         self.latch = former.latch.measured_otherwise();
         (self.levels, self.kept) = (former.levels, former.kept);
+        if let Some((_, since)) = self.latch.in_force() {
+            self.levels.are_void_until(since);
+        }
     }
 
     /// That the level in force ends because the benchmark is no longer watched.
@@ -206,7 +209,7 @@ impl Alarm {
             level,
             state: AlertState::Resolved,
             key: record.alert_key(level, since),
-            rule: "removed".to_owned(),
+            rule: REMOVED.to_owned(),
             text,
         };
         Some(record.event(now, kind))

@@ -108,7 +108,7 @@ impl Alarm {
         let change = self.latch.raise(policy, &evidence)?;
         self.levels.note(now, &self.latch);
         let text = format!(
-            "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {} within {} ({}) from now on",
+            "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {} within {} ({}) from {until:.0} on",
             record.benchmark(),
             change.level,
             change.rule,

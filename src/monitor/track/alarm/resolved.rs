@@ -26,6 +26,7 @@ impl Alarm {
         }
         self.latch.resolve(now);
         self.levels.note(now, &self.latch);
+        self.levels.are_void_until(now);
         (self.attention_until, self.kept, self.overdue) = (None, None, None);
         self.occurrences.end();
         let by = given.by.as_deref().unwrap_or("somebody");
