@@ -31,6 +31,17 @@ impl Level {
     }
 }
 
+impl Policy {
+    /// What a red that is pending waits for.
+    pub fn pending_red_in_words(&self) -> String {
+        format!(
+            ", which calls red once it is {} in the mean over some {}",
+            rounded(self.red_mean_chance()),
+            hours_in_words(self.red_course())
+        )
+    }
+}
+
 fn rounded(chance: f64) -> f64 {
     (1000.0 * chance).round() / 1000.0
 }

@@ -2,9 +2,9 @@
 //!
 //! A forecast that changes its mind does not lower a level. What does: the slope has slowed to half the
 //! highest velocity seen at this level, without gaining, for a whole evacuation time in which the evidence
-//! called for less, and for less than orange where it is red; or it has been seen to hold a velocity under the critical one, without gaining, for the stated time, and is no faster
-//! than when the level was called, or nothing is called any more. What
-//! lies within the error of a velocity is no gain, and motion that never stood out of it has not to slow down.
+//! called for less, and no chance calls orange where it is red; or it has been seen to hold a velocity under the critical one, without gaining, for the
+//! stated time, and is no faster than when the level was called, or than half of the highest velocity while no chance calls orange, or nothing is called any
+//! more. What lies within the error of a velocity is no gain, and motion that never stood out of it has not to slow down.
 
 use super::evidence::AlertEvidence;
 use super::level::Level;
@@ -236,14 +236,18 @@ impl Latch {
         }
         // Motion that never stood out of its error has not to slow down.
         let is_slow = self.has_slowed_to(velocity, error) || self.peak_velocity <= 0.0;
-        // Many a slope pauses before it collapses: while the chance within the outlook calls orange red is not over because it has.
-        let outlook = evidence.chance_within_outlook;
-        let is_likely = outlook.is_some_and(|chance| chance >= policy.orange_chance);
+        // Many a slope pauses before it collapses: while a chance calls orange red is not over because it has.
+        let is_likely = policy.calls_orange_by_chance(evidence);
         let pauses = self.level == Level::Red && is_likely;
         let slowed = less && is_slow && !pauses;
-        // A slope that has become faster since the level was called is not over it while more than nothing is called.
+        // A slope that has become faster since the level was called is not over it while more than nothing is called, until it has slowed
+        // down to half of its highest velocity and no chance calls orange.
         let is_no_faster = velocity <= STEADY_GAIN * self.first_velocity + CLEAR * error;
-        let is_over = is_no_faster || self.first_velocity <= 0.0 || call.level == Level::Green;
+        let is_past_its_peak = velocity + error <= SLOWED_TO * self.peak_velocity && !is_likely;
+        let is_over = is_no_faster
+            || is_past_its_peak
+            || self.first_velocity <= 0.0
+            || call.level == Level::Green;
         let steady = less && is_over && velocity < policy.critical_velocity_mm_per_day;
         let motion = (velocity, error);
         self.slow = SteadyStretch::go_on(self.slow, slowed.into(), evidence.now, motion);
@@ -483,6 +487,29 @@ mod tests {
         };
         assert_eq!(after(0.5), Level::Red);
         assert_eq!(after(0.0), Level::Green);
+    }
+
+    #[test]
+    fn a_surge_that_slows_down_is_over_once_it_has_been_at_half_of_its_peak_for_the_stated_time() {
+        let (policy, latch) = red_at_hundred();
+        let reds = |chance: f64, slow: f64| {
+            let mut latch = latch.clone();
+            let level = |hour: i64| {
+                let velocity = if hour < 5 * 24 { 400.0 } else { slow };
+                let outlook = AlertEvidence {
+                    chance_within_outlook: Some(chance),
+                    ..evidence(hour, 0.0, velocity)
+                };
+                latch.update(&policy, &outlook);
+                latch.level()
+            };
+            let levels = (1..20 * 24).map(level);
+            levels.filter(|level| *level == Level::Red).count() / 24
+        };
+        assert_eq!(reds(0.5, 150.0), 11);
+        // It is no slower than half, or the outlook calls orange.
+        assert_eq!(reds(0.5, 250.0), 19);
+        assert_eq!(reds(0.75, 150.0), 19);
     }
 
     #[test]

@@ -18,6 +18,13 @@ pub struct Call {
 }
 
 impl Policy {
+    /// Whether a chance calls orange: the one within the outlook, or that for red while red is pending.
+    pub(super) fn calls_orange_by_chance(&self, evidence: &AlertEvidence) -> bool {
+        let outlook = evidence.chance_within_outlook;
+        outlook.is_some_and(|chance| chance >= self.orange_chance)
+            || evidence.red == RedCourse::IsNear
+    }
+
     /// The most severe call that the evidence makes.
     pub fn call(&self, evidence: &AlertEvidence) -> Call {
         let reaches =

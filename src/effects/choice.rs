@@ -177,12 +177,15 @@ impl Search<'_> {
     }
 
     /// What cannot be separated from the one of that index: what may be accepted as well, and what gains more and is refused by so few
-    /// readings of the later block that chance may have done it.
+    /// readings of the later block that chance may have done it, or although it may have acted.
     fn ties(&self, refitted: &[Refitted], first: usize, judged: &[Judgement]) -> Vec<Rival> {
         let best = &refitted[first];
         let each = refitted.iter().zip(judged).enumerate();
         let may_be = |one: &Refitted, objection: Option<&Objection>| {
-            objection.is_none_or(|objection| objection.is_within_chance && one.gain >= best.gain)
+            objection.is_none_or(|objection| {
+                let is_open = objection.is_within_chance || self.may_have_acted(one);
+                is_open && one.gain >= best.gain
+            })
         };
         let others =
             each.filter(|(k, (one, judged))| *k != first && may_be(one, judged.1.as_ref()));

@@ -18,8 +18,8 @@ const DAILY: [f64; 2] = [1.0, 0.5];
 const UNEVEN: f64 = 0.5;
 
 /// Said where the day may be what comes and goes.
-pub(super) const REMARK: &str = "The motion comes and goes with the day of 24 hours, or with half of it: warmth, melt water and \
-    the sun's own tides all do, and these readings cannot tell which it is. A record of the temperature can.";
+pub(super) const REMARK: &str = "A tide explains these readings, and a cycle of the day of 24 hours explains them about as well: warmth, melt water and \
+    the sun's own tides all have one. A record of the temperature, or a longer one, can show which it is.";
 
 /// What else comes and goes with the day: melt water in the ground, and warmth in the instrument.
 pub(super) fn rivals() -> [Rival; 2] {

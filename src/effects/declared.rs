@@ -6,7 +6,7 @@ use super::diagnosis::Judged;
 use super::explain::{TOO_FEW, explained_by};
 use super::explanation::{Candidate, DeclaredEffect, Effect, Explained, Explanation};
 use super::findings::{Findings, findings};
-use super::given::{Cause, put_in, shapes};
+use super::given::{Cause, fits_best_before, put_in, shapes};
 use super::judge::coefficients;
 use super::kind::Kind;
 use super::options::Options;
@@ -18,7 +18,7 @@ use super::surrogate::{Innovations, Tried};
 use super::term::Scratch;
 use super::upslope;
 use super::verdict::{Verdict, effect};
-use crate::reading::{Channel, Series, days_since};
+use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
 
 /// Why a cause is no part of the law of a record.
 const NOT_SEEN: &str = "it cannot be put into the law: the record is too short for it, too widely sampled, or of a quantity \
@@ -67,12 +67,13 @@ pub fn explain_given(
             given = causes.iter().map(|one| not_put_in(one, TOO_FEW)).collect();
             return (Findings::none(cleaned.unit), remarks);
         };
+        let elsewhere = moved(causes, &law.terms, &ready.problem);
         let (findings, judged) = law.findings(ready, causes, options);
         let is_refused = |one: &DeclaredEffect| one.rejected_because.is_some();
         if judged.iter().any(is_refused) && !findings.known_load.parts.is_empty() {
             remarks.push(ALL_IN.to_owned());
         }
-        remarks.extend(moved(&judged, causes, &ready.problem));
+        remarks.extend(elsewhere);
         given = judged;
         progress(1.0);
         (findings, remarks)
@@ -90,6 +91,8 @@ struct DeclaredTerm {
     how: Accepted,
     held_out: Option<f64>,
     rejected_because: Option<String>,
+    /// When it would fit best, of what happened at a declared time.
+    fits_best: Option<Timestamp>,
 }
 
 /// The law with all that was declared and can be put into it.
@@ -113,6 +116,7 @@ impl DeclaredLaw {
     ) -> Option<Self> {
         progress(0.05);
         let mut search = ready.search(options, is_drawn);
+        search.is_declared = true;
         let null = search.null(&ready.plain)?;
         let (full, placed) = put_in(&mut search, null.clone(), causes)?;
         let mut terms = Vec::new();
@@ -227,15 +231,15 @@ impl DeclaredLaw {
     }
 }
 
-/// Which causes fit best at another time than the one that was declared.
-fn moved(judged: &[DeclaredEffect], causes: &[Cause], problem: &Problem) -> Vec<String> {
-    let each = judged.iter().zip(causes).filter_map(|(one, cause)| {
-        let (declared, found) = (cause.at?, one.effect.as_ref()?.at?);
-        let days = days_since(declared, found);
+/// Which causes would fit best at another time than the one that was declared.
+fn moved(causes: &[Cause], terms: &[(usize, DeclaredTerm)], problem: &Problem) -> Vec<String> {
+    let each = terms.iter().filter_map(|(index, found)| {
+        let cause = &causes[*index];
+        let (declared, best) = (cause.at?, found.fits_best?);
+        let days = days_since(declared, best);
         (days.abs() > 1.5 * problem.spacing).then(|| {
             format!(
-                "{}: it fits best at {found:.0}, {:.1} days {}.",
-                one.declared,
+                "{cause}: it fits best at {best:.0}, {:.1} days {}; it is judged at the time that was declared.",
                 days.abs(),
                 if days > 0.0 { "later" } else { "earlier" }
             )
@@ -278,6 +282,9 @@ impl Search<'_> {
             p_value: 1.0,
         };
         let one = self.as_declared(&base, one, cause)?;
+        let best = self.ground(&base);
+        let best = best.and_then(|ground| fits_best_before(&ground, cause));
+        let fits_best = best.and_then(|at| after_days(problem.epoch, problem.t[at]));
         let (held_out, objection) = self.judged(&base, &one);
         let rejected_because = objection.map(|objection| objection.why);
         self.note(&one.term, &one, held_out, rejected_because.clone());
@@ -290,6 +297,7 @@ impl Search<'_> {
             how: one.with_season(how, problem),
             held_out,
             rejected_because,
+            fits_best,
         })
     }
 

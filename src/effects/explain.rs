@@ -71,7 +71,11 @@ pub(super) fn explained_by(
         .faults
         .iter()
         .any(|fault| fault.kind == FaultKind::Interpolated && fault.channel.is_none());
-    let (findings, of_search) = look(series, channels, is_drawn);
+    let (mut findings, of_search) = look(series, channels, is_drawn);
+    if inspected.is_newest_left_out && findings.verdict.effect == Kind::NONE {
+        // The newest reading may be the beginning of a motion: that is not nothing.
+        findings.verdict = Effect::of(Kind::UNEXPLAINED);
+    }
     let critical = options.critical_velocity_mm_per_day;
     let forecast = forecast_change(series, channels, &findings.known_load, critical);
     let of_channels = remarks::of_channels(series, channels);

@@ -77,6 +77,8 @@ pub struct Effect {
     pub memory_days: Option<f64>,
     /// Log-load for one standard deviation of what enters.
     pub gain_per_sd: Option<f64>,
+    /// By which factor the velocity is higher where what enters is one standard deviation higher: the law's state answers to the load too.
+    pub velocity_factor_per_sd: Option<f64>,
     /// 5 and 95 % of the gain.
     pub gain_interval: Option<[f64; 2]>,
     /// The strongest period, days.
@@ -108,6 +110,7 @@ impl Effect {
             lag_days: None,
             memory_days: None,
             gain_per_sd: None,
+            velocity_factor_per_sd: None,
             gain_interval: None,
             period_days: None,
             at: None,

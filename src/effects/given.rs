@@ -18,6 +18,9 @@ use super::trials::{Trial, TrialBase};
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
 use std::fmt;
 
+/// A declared time may be off by so many readings: clocks are, and so is what people write down.
+const DECLARED_WITHIN: usize = 2;
+
 /// An effect that is known, or declared, to be there; how large it is, how late it acts, and what shape it has, is not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
@@ -25,7 +28,7 @@ pub struct Cause {
     pub kind: Kind,
     /// The covariate it works through; `None` for kinds that need none.
     pub channel: Option<String>,
-    /// When it happened, for kinds that happen once; `None` where that is not known. It is moved to where it fits best.
+    /// When it happened, for kinds that happen once; `None` where that is not known. It is moved by [`DECLARED_WITHIN`] readings at most.
     pub at: Option<Timestamp>,
 }
 
@@ -149,6 +152,27 @@ fn promising(ground: &TrialBase, cause: &Cause) -> Vec<Trial> {
 
 /// Everything that a cause may look like: its delays, its times, its periods.
 pub(super) fn shapes(ground: &TrialBase, cause: &Cause) -> Vec<Term> {
+    shapes_at(
+        ground,
+        cause,
+        times(ground.problem, cause.at, DECLARED_WITHIN),
+    )
+}
+
+/// Before which reading a cause whose time is declared would fit best, of those within what a search distinguishes.
+pub(super) fn fits_best_before(ground: &TrialBase, cause: &Cause) -> Option<usize> {
+    let tried = event_times(ground.problem);
+    let apart = tried.windows(2).map(|pair| pair[1] - pair[0]).max();
+    let within = apart.unwrap_or(1).max(DECLARED_WITHIN);
+    let beside = times(ground.problem, Some(cause.at?), within);
+    let trials = shapes_at(ground, cause, beside).into_iter();
+    let best = trials
+        .map(|term| ground.trial(term))
+        .max_by(|a, b| a.gain.total_cmp(&b.gain));
+    best?.term.at
+}
+
+fn shapes_at(ground: &TrialBase, cause: &Cause, times: Vec<usize>) -> Vec<Term> {
     let (problem, kind) = (ground.problem, cause.kind);
     match kind.definition().trying {
         Trying::CovariateInLoad(_) | Trying::CovariateInReading(_) => {
@@ -157,11 +181,8 @@ pub(super) fn shapes(ground: &TrialBase, cause: &Cause) -> Vec<Term> {
             let through = own.map(|driver| ground.through(kind, driver));
             through.unwrap_or_default().into_iter().flatten().collect()
         }
-        Trying::Once(_) => times(problem, cause.at)
-            .into_iter()
-            .flat_map(|at| once(kind, at))
-            .collect(),
-        Trying::JumpOfReading => times(problem, cause.at)
+        Trying::Once(_) => times.into_iter().flat_map(|at| once(kind, at)).collect(),
+        Trying::JumpOfReading => times
             .into_iter()
             .map(|at| jump(problem, kind, at))
             .collect(),
@@ -171,13 +192,13 @@ pub(super) fn shapes(ground: &TrialBase, cause: &Cause) -> Vec<Term> {
 }
 
 /// The readings before which it may have happened: those that the search would try, or, where the time is known, all
-/// within what the search distinguishes.
-fn times(problem: &Problem, at: Option<Timestamp>) -> Vec<usize> {
-    let tried = event_times(problem);
-    let Some(time) = at else { return tried };
-    let apart = tried.windows(2).map(|pair| pair[1] - pair[0]).max();
-    let (at, apart) = (reading_at(problem, time), apart.unwrap_or(1));
-    (at.saturating_sub(apart).max(2)..(at + apart + 1).min(problem.used - 2)).collect()
+/// within so many readings of it.
+fn times(problem: &Problem, at: Option<Timestamp>, within: usize) -> Vec<usize> {
+    let Some(time) = at else {
+        return event_times(problem);
+    };
+    let at = reading_at(problem, time);
+    (at.saturating_sub(within).max(2)..(at + within + 1).min(problem.used - 2)).collect()
 }
 
 /// The first reading not before `time`.

@@ -102,9 +102,6 @@ pub(super) fn objection(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) 
         Act::PerSlip if own[0] <= 0.0 => {
             Some("its sign is not physical: the slope would steepen under the block".to_owned())
         }
-        Act::Reading(_) if term.is_jump_of_reading() && own[0] > 0.0 => {
-            slip_instead(problem, term.at?, own[0], drivers)
-        }
         Act::Averaging if own[0] < 0.5 => {
             Some("the readings are means over no more than their own spacing".to_owned())
         }
@@ -124,6 +121,19 @@ pub(super) fn objection(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) 
         | Act::Friction(_)
         | Act::Reading(_) => None,
     }
+}
+
+/// Why the newest term, a jump of the reading in the sense of the motion, may be slip of the ground; `None` of any other.
+pub(super) fn may_be_slip(
+    problem: &Problem,
+    fitted: &Fitted,
+    drivers: &[Driver],
+) -> Option<String> {
+    let term = fitted.terms.last()?;
+    let size = *fitted.parameters.last()?;
+    let is_forward = term.is_jump_of_reading() && size > 0.0;
+    let at = term.at.filter(|_| is_forward)?;
+    slip_instead(problem, at, size, drivers)
 }
 
 /// Why the newest term, which happened once, is not judged: a covariate in the law has no values at that time, or none that still acts.

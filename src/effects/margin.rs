@@ -1,7 +1,7 @@
 //! What a candidate must gain before a later block is looked at.
 
 use super::definition::{Support, Trying};
-use super::judge::objection;
+use super::judge::{may_be_slip, objection};
 use super::noise::Memory;
 use super::search::{Refitted, SIGNIFICANT, Search};
 
@@ -12,6 +12,9 @@ const BY_SHAPE: f64 = 2.0;
 /// covariates had nothing to do with them were put on one, at gains of 10 to 33, four of them with a memory of .39 to .50 of the record.
 const SLOW: f64 = 1.0 / 3.0;
 const BY_SLOW_RESPONSE: f64 = 4.0;
+
+/// A covariate that gains as much from nothing in fewer of the cases is named beside what gains less.
+const NEARLY_SIGNIFICANT: f64 = 0.1;
 
 impl Search<'_> {
     /// Why not, before any later block is looked at: what it gains, by chance too, and what the physics allow.
@@ -29,7 +32,25 @@ impl Search<'_> {
                 100.0 * one.p_value
             ));
         }
-        objection(self.problem, &one.fitted, self.drivers)
+        let (problem, fitted, drivers) = (self.problem, &one.fitted, self.drivers);
+        objection(problem, fitted, drivers).or_else(|| {
+            // Who declares an offset knows that it was the instrument.
+            let is_open = !self.is_declared;
+            is_open.then(|| may_be_slip(problem, fitted, drivers))?
+        })
+    }
+
+    /// Whether nothing speaks against a candidate but that chance gains as much too often (of a covariate), or that slip of the ground would
+    /// look the same (of a jump of the reading): it may be what acted all the same.
+    pub(super) fn may_have_acted(&self, one: &Refitted) -> bool {
+        let (problem, fitted) = (self.problem, &one.fitted);
+        if objection(problem, fitted, self.drivers).is_some() || one.gain < self.margin(one) {
+            return false;
+        }
+        if one.term.channel.is_some() {
+            return (SIGNIFICANT..NEARLY_SIGNIFICANT).contains(&one.p_value);
+        }
+        one.p_value < SIGNIFICANT && may_be_slip(problem, fitted, self.drivers).is_some()
     }
 
     /// By how much the BIC has to fall. A walk of the readings that is so small that the law takes it up leaves bends which no noise of the

@@ -56,6 +56,7 @@ mod surrogate;
 mod term;
 mod trials;
 mod upslope;
+mod velocity_factor;
 mod verdict;
 mod watch;
 mod weights;

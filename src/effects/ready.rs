@@ -51,6 +51,7 @@ impl Ready {
             bank: &self.bank,
             options,
             is_drawn,
+            is_declared: false,
             scratch: Scratch::default(),
             candidates: Vec::new(),
             withheld: None,

@@ -118,6 +118,8 @@ pub(super) struct Search<'a> {
     pub(super) options: &'a Options,
     /// Whether the values are not raw readings: smoother than any instrument's.
     pub(super) is_drawn: bool,
+    /// Whether what it judges was declared by people.
+    pub(super) is_declared: bool,
     pub(super) scratch: Scratch,
     pub(super) candidates: Vec<Candidate>,
     pub(super) withheld: Option<Withheld>,

@@ -76,6 +76,7 @@ impl Search<'_> {
             bank: self.bank,
             options: self.options,
             is_drawn: self.is_drawn,
+            is_declared: false,
             scratch: std::mem::take(&mut self.scratch),
             candidates: Vec::new(),
             withheld: None,

@@ -17,6 +17,7 @@ use super::response::Driver;
 use super::rival::Rival;
 use super::search::{Accepted, SIGNIFICANT, SearchResult};
 use super::term::{Scratch, Term, law_parameters, time_of};
+use super::velocity_factor;
 use crate::reading::{Quantity, Unit};
 
 /// What the search is concluded to mean.
@@ -352,7 +353,10 @@ pub(super) fn effect(
         memory_days: term.response.map(|response| response.memory_days()),
         at: time_of(problem, term),
         bic_gain: how.bic_gain,
-        contribution_rms: rms(&contribution(problem, full, index, scratch)).map(|c| c / factor),
+        contribution_rms: rms(&contribution(problem, full, index, scratch))
+            // A law that nearly fails without it has no prediction to be compared with either.
+            .filter(|added| *added <= problem.range())
+            .map(|added| added / factor),
         gain_per_sd: size.gain_per_sd,
         period_days: size.period_days,
         size: size.size,
@@ -366,6 +370,7 @@ pub(super) fn effect(
             1.0
         };
         let bounds = gain_interval::interval(ready, full, index, scratch);
+        said.velocity_factor_per_sd = velocity_factor::per_sd(problem, full, index, scratch);
         said.gain_interval = bounds.map(|bounds| bounds.map(|bound| bound / scale));
     }
     said

@@ -90,7 +90,7 @@ impl Indicators {
             let later = newest(observations, event.days)?;
             let scales = Scales::at(&later, later.values.len())?;
             let later = Self::by(&later, scales);
-            let share = LATER * event.share * as_fast_as(&event, &whole.scales);
+            let share = LATER * event.share * as_fast_as(&event, &later.scales);
             Some((share, Box::new(later)))
         });
         Some(whole)
@@ -224,11 +224,12 @@ impl Indicators {
     }
 }
 
-/// The root of how fast the slope is now beside what it was in an event that it survived, at most 1: by blocks no longer than those in which the event was found,
-/// and less the error of each. What is slower than a surge that stopped is mostly another one of its kind.
+/// The root of how fast the slope is by the readings since an event that it survived, of these `scales`, beside what it was in it, at most 1: by blocks no
+/// longer than those over which the event is known, and less the error of each, which the event itself would make larger. What is slower than a surge that
+/// stopped is mostly another one of its kind.
 fn as_fast_as(event: &PastEvent, scales: &Scales) -> f64 {
     let each = scales.each.iter();
-    let shorter = each.take_while(|scale| scale.days <= event.block_days);
+    let shorter = each.take_while(|scale| scale.days <= event.block_days.max(scales.base_days));
     let now = shorter.map(|scale| scale.velocity - error(scale));
     let fastest = now.fold(0.0, f64::max);
     (fastest / event.velocity.max(f64::MIN_POSITIVE))

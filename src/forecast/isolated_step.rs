@@ -13,9 +13,9 @@ const ABOVE_OTHERS: f64 = 2.0;
 const GROWN: f64 = 1.5;
 /// A jump is so many standard errors of a reading.
 const LEAST: f64 = 6.0;
-/// Between readings that are further apart than so many usual intervals a step may be motion that nobody saw.
+/// Between readings that are further apart than so many usual intervals a step may be motion that nobody saw: it has to be over for longer.
 const GAP: f64 = 3.0;
-/// So many readings after it, and before it, show how the slope moves; and the most that are looked at.
+/// So many readings after it, and before it (and after it in a gap), show how the slope moves; and the most that are looked at.
 const FEWEST_AFTER: usize = 4;
 const FEWEST_BEFORE: usize = 12;
 const MOST_BESIDE: usize = 24;
@@ -52,9 +52,9 @@ fn isolated_steps(observations: &Observations) -> Vec<(usize, f64)> {
         .map(|two| two[1].t_days - two[0].t_days)
         .collect();
     let longest = GAP * median(&mut spans);
-    let is_seen = |at: &usize| values[*at].t_days - values[*at - 1].t_days <= longest;
+    let is_seen = |at: usize| values[at].t_days - values[at - 1].t_days <= longest;
     let size = |at: usize| (values[at].value - values[at - 1].value).abs();
-    let mut largest: Vec<usize> = (1..values.len()).filter(is_seen).collect();
+    let mut largest: Vec<usize> = (1..values.len()).collect();
     largest.sort_unstable_by(|a, b| size(*b).total_cmp(&size(*a)));
     largest.truncate(MOST_JUMPS + 1);
     let pairs = largest
@@ -75,15 +75,28 @@ fn isolated_steps(observations: &Observations) -> Vec<(usize, f64)> {
     if jumps.windows(2).any(grow) {
         return Vec::new();
     }
-    let each = jumps.into_iter();
-    each.filter_map(|at| Some((at, to_take_off(values, at, sigma)?)))
-        .collect()
+    let each = jumps.iter().enumerate().filter_map(|(place, &at)| {
+        // Other jumps are no part of how the slope moves beside this one.
+        let from = place.checked_sub(1).map_or(0, |before| jumps[before]);
+        let until = jumps.get(place + 1).copied().unwrap_or(values.len());
+        let fewest = if is_seen(at) {
+            FEWEST_AFTER
+        } else {
+            FEWEST_BEFORE
+        };
+        let after = values[at..until].len();
+        let sides = (&values[from..at], &values[at..until]);
+        let jump = to_take_off(sides, sigma).filter(|_| after >= fewest)?;
+        Some((at, jump))
+    });
+    each.collect()
 }
 
-/// How much, mm, of the jump before the reading `at` is taken off; `None` where the slope moves otherwise after it, or too little is known.
-fn to_take_off(values: &[Observation], at: usize, sigma: f64) -> Option<f64> {
-    let before = &values[at.saturating_sub(MOST_BESIDE)..at];
-    let after = &values[at..values.len().min(at + MOST_BESIDE)];
+/// How much, mm, of the jump between these readings `before` and `after` it is taken off; `None` where the slope moves otherwise after it, or too little is
+/// known.
+fn to_take_off((before, after): (&[Observation], &[Observation]), sigma: f64) -> Option<f64> {
+    let before = &before[before.len().saturating_sub(MOST_BESIDE)..];
+    let after = &after[..after.len().min(MOST_BESIDE)];
     if before.len() < FEWEST_BEFORE || after.len() < FEWEST_AFTER {
         return None;
     }

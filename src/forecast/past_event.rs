@@ -25,26 +25,38 @@ pub struct PastEvent {
     /// How surely it stands out of all else, above 0 and at most 1: blocks move along with the newest reading, and a limit would be
     /// passed back and forth.
     pub share: f64,
-    /// How fast the slope was, mm/day, as the mean over blocks of [`PastEvent::block_days`].
+    /// How fast the slope was, mm/day, in the fastest of the events, as the mean over blocks of [`PastEvent::block_days`].
     pub velocity: f64,
     /// Days.
     pub block_days: f64,
 }
 
 impl PastEvent {
-    /// The newest of those that stand out nearly as surely as the one that does most, where a share `usual` of all events is what often
-    /// happens on the slope.
+    /// The newest of those that stand out nearly as surely as the one that does most, with the velocity of the fastest of these, where a share `usual` of
+    /// all events is what often happens on the slope.
     pub(super) fn newest(found: &[Self], usual: f64) -> Option<Self> {
         let most = found.iter().map(|event| event.share).fold(0.0, f64::max);
         let sure = found.iter().filter(|event| event.share >= 0.5 * most);
         let newest = sure.clone().min_by(|a, b| a.days.total_cmp(&b.days))?;
-        let fastest = sure.max_by(|a, b| a.velocity.total_cmp(&b.velocity))?;
+        let fastest = sure
+            .map(Self::over_a_day)
+            .max_by(|a, b| a.velocity.total_cmp(&b.velocity))?;
         let share = most * (1.0 - usual);
         (share > 0.0).then_some(Self {
             days: newest.days,
             share,
-            ..*fastest
+            ..fastest
         })
+    }
+
+    /// With its velocity as the mean over a day at least: a jump is as large, however often the slope is read.
+    fn over_a_day(&self) -> Self {
+        let over = self.block_days.max(1.0);
+        Self {
+            velocity: self.velocity * self.block_days / over,
+            block_days: over,
+            ..*self
+        }
     }
 }
 

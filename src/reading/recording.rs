@@ -1,6 +1,6 @@
 //! Everything that one or more files hold, how files join, and which series is meant.
 
-use super::{BenchmarkId, Channel, Disorder, Quantity, Series};
+use super::{BenchmarkId, Channel, Disorder, Quantity, Reading, Series};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
@@ -18,20 +18,6 @@ pub struct Recording {
 /// Two files that cannot be joined.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MergeError {
-    /// One quantity of one benchmark in two units.
-    #[error(
-        "benchmark {benchmark}: {quantity} stands in {first} in one file and in {second} in another: expected one unit"
-    )]
-    Units {
-        /// Whose readings.
-        benchmark: BenchmarkId,
-        /// Which of its quantities.
-        quantity: Quantity,
-        /// The unit met first.
-        first: String,
-        /// The other.
-        second: String,
-    },
     /// Velocities that are means over different spans.
     #[error(
         "benchmark {benchmark}: velocities are averaged over {first} in one file and over {second} in another: expected one span"
@@ -102,11 +88,11 @@ fn listed(names: &[String]) -> String {
 
 impl Recording {
     /// Joins files in the order given: the rows of one quantity of one benchmark become one
-    /// series, and where two files disagree about a time the later file stands. Overlaps are
+    /// series, in the unit of the first, and where two files disagree about a time the later file stands. Overlaps are
     /// counted; the order of the files is not disorder.
     ///
     /// # Errors
-    /// [`MergeError`] when files disagree about a unit or about the averaging of velocities.
+    /// [`MergeError`] when files disagree about the unit of a channel or about the averaging of velocities.
     pub fn merge(parts: Vec<Self>) -> Result<(Self, Disorder), MergeError> {
         let mut series = BTreeMap::new();
         let mut channels = BTreeMap::new();
@@ -204,14 +190,6 @@ fn join_series(
         }
         Entry::Occupied(mut place) => {
             let first = place.get_mut();
-            if first.unit != next.unit {
-                return Err(MergeError::Units {
-                    benchmark: next.benchmark,
-                    quantity: next.unit.quantity(),
-                    first: first.unit.to_string(),
-                    second: next.unit.to_string(),
-                });
-            }
             if first.averaging != next.averaging {
                 let span = |series: &Series| {
                     series
@@ -224,7 +202,14 @@ fn join_series(
                     benchmark: next.benchmark,
                 });
             }
-            first.readings.extend(next.readings);
+            // A logger that was set up anew may write in another unit: the daemon converts it too.
+            let factor = next.unit.factor() / first.unit.factor();
+            let converted = next.readings.into_iter().map(|reading| Reading {
+                value: reading.value * factor,
+                sigma: reading.sigma.map(|sigma| sigma * factor),
+                ..reading
+            });
+            first.readings.extend(converted);
         }
     }
     Ok(())
@@ -271,7 +256,7 @@ fn join_provenance(joined: &mut BTreeMap<String, String>, next: BTreeMap<String,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reading::{Reading, Timestamp, Unit};
+    use crate::reading::{Timestamp, Unit};
 
     fn one(benchmark: &str, unit: Unit, rows: &[(i64, f64)]) -> Recording {
         let readings = rows
@@ -305,14 +290,14 @@ mod tests {
     }
 
     #[test]
-    fn files_in_two_units_are_not_joined() {
+    fn files_in_two_units_become_one_series_in_that_of_the_first() {
         let centimetres = Unit::parse("cm").unwrap();
-        let parts = vec![one("a", Unit::MM, &[]), one("a", centimetres, &[])];
-        let error = Recording::merge(parts).unwrap_err().to_string();
-        assert!(
-            error.contains("benchmark a") && error.contains("cm"),
-            "{error}"
-        );
+        let parts = vec![
+            one("a", Unit::MM, &[(1, 5.0)]),
+            one("a", centimetres, &[(2, 0.75)]),
+        ];
+        let (merged, _) = Recording::merge(parts).unwrap();
+        assert_eq!(merged, one("a", Unit::MM, &[(1, 5.0), (2, 7.5)]));
     }
 
     #[test]

@@ -134,7 +134,7 @@ fn effects(explanation: &Explanation) -> Option<TextTable> {
     let names = accepted.iter().map(|effect| effect.effect.to_string());
     let mut table = TextTable::headed([String::new()].into_iter().chain(names));
     let adds = format!("adds to the readings, rms {}", explanation.unit);
-    let rows: [(&str, PageCell); 13] = [
+    let rows: [(&str, PageCell); 14] = [
         ("channel", |effect| {
             effect.channel.clone().unwrap_or_else(dash)
         }),
@@ -149,8 +149,11 @@ fn effects(explanation: &Explanation) -> Option<TextTable> {
         ("size", |effect| {
             with_unit(effect.size, effect.unit.as_deref())
         }),
-        ("gain per sd", |effect| number(effect.gain_per_sd)),
-        ("gain, 5 to 95 %", |effect| {
+        ("velocity factor per sd", |effect| {
+            number(effect.velocity_factor_per_sd)
+        }),
+        ("log-load per sd", |effect| number(effect.gain_per_sd)),
+        ("log-load per sd, 5 to 95 %", |effect| {
             let bounds = effect.gain_interval;
             bounds.map_or_else(dash, |bounds| bounds.map(brief).join(" to "))
         }),

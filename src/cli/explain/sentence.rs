@@ -82,7 +82,13 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
                     .to_owned(),
             );
         } else if explanation.verdict.effect.is_of_the_reading() {
-            said.push("It lies in the measurement, not in the slope.".to_owned());
+            let mut also = explanation.also.iter();
+            let is_all = also.all(|effect| effect.effect.is_of_the_reading());
+            said.push(if is_all {
+                "It lies in the measurement, not in the slope.".to_owned()
+            } else {
+                "That lies in the measurement; not all that follows does.".to_owned()
+            });
         }
     }
     for effect in &explanation.also {
@@ -92,6 +98,13 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
     if !explanation.cannot_separate_from.is_empty() {
         let rivals = Rival::listed(&explanation.cannot_separate_from);
         said.push(format!("Cannot be separated from: {rivals}."));
+        let mut kinds = explanation.cannot_separate_from.iter();
+        if kinds.any(|rival| rival.kind == Kind::SEASONAL) {
+            said.push(
+                "A wave of the year may lie in the readings themselves too, as in those of GNSS."
+                    .to_owned(),
+            );
+        }
     }
     said.extend(explanation.remarks.iter().cloned());
     said.extend(explanation.error.caveat.clone());
@@ -198,10 +211,14 @@ fn gain_words(effect: &Effect, gain: f64) -> String {
             .map_or(String::new(), |unit| format!(" {unit}"));
         return format!("{more} adds {}{unit} to the reading", brief(gain));
     }
-    let verb = if gain < 0.0 { "lowers" } else { "raises" };
+    // What it does at once the state of the law takes back in part, or carries on.
+    let (at_once, factor) = effect
+        .velocity_factor_per_sd
+        .map_or((" at once", gain), |factor| ("", factor.ln()));
+    let verb = if factor < 0.0 { "lowers" } else { "raises" };
     format!(
-        "{more} {verb} the velocity by a factor of {}",
-        brief(gain.abs().exp())
+        "{more}{at_once} {verb} the velocity by a factor of {}",
+        brief(factor.abs().exp())
     )
 }
 

@@ -63,7 +63,7 @@ mod tests {
         assert_eq!(
             first_line(&lake()),
             "BLKM: consistent with hydrological forcing by lake_level_m (level; mean delay 12 days; \
-             95 % of the response within 36 days; one sd more raises the velocity by a factor of 2.4), p = .005"
+             95 % of the response within 36 days; one sd more at once raises the velocity by a factor of 2.4), p = .005"
         );
     }
 
@@ -179,12 +179,13 @@ mod tests {
             channel: Some("reservoir_level_m".to_owned()),
             form: Some(Form::Rate),
             gain_per_sd: Some(-1.0),
+            velocity_factor_per_sd: Some(0.5),
             ..Effect::of(Kind::HYDROLOGICAL)
         };
         assert_eq!(
             verdict(draw_down),
             "hydrological forcing by reservoir_level_m (rate; one sd more of its rate of change \
-             lowers the velocity by a factor of 2.72)"
+             lowers the velocity by a factor of 2)"
         );
         let parted = Effect {
             at,

@@ -25,6 +25,10 @@ fn what_is_there_stands_in_the_order_in_which_it_was_declared_and_the_error_fall
     assert_eq!(kinds, [Kind::OFFSET, Kind::HYDROLOGICAL]);
     let jump = said.given[0].effect.as_ref().unwrap();
     assert!((jump.size.unwrap() + 15.0).abs() < 1.0, "{jump:?}");
+    // It was drawn as e^(0.5 sin), whose standard deviation is .707, and the law's state takes nothing of it back.
+    let lake = said.given[1].effect.as_ref().unwrap();
+    let factor = lake.velocity_factor_per_sd.unwrap();
+    assert!((factor - 0.354_f64.exp()).abs() < 0.05, "{lake:?}");
     assert!(said.given[1].held_out.unwrap() < 0.5, "{:?}", said.given[1]);
     let fit = said.error.fit;
     assert!(

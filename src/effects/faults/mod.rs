@@ -43,6 +43,8 @@ pub struct Inspected {
     pub flags: Vec<String>,
     /// The same for people, a sentence each.
     pub remarks: Vec<String>,
+    /// Whether the newest reading is left out until more is read: it left all before it at once.
+    pub(super) is_newest_left_out: bool,
     /// Channels that are one instrument: the one with resets, and the other.
     pub(super) twins: Vec<(String, String)>,
 }
@@ -67,8 +69,9 @@ pub fn inspect(series: &Series, channels: &[Channel]) -> Inspected {
         let key = |fault: &Fault| (fault.at, fault.channel.clone(), fault.kind);
         key(a).cmp(&key(b))
     });
-    let of_newest = bench.newest_alone();
+    let of_newest = bench.leave_out_newest_alone();
     Inspected {
+        is_newest_left_out: of_newest.is_some(),
         flags: remarks::flags(&bench.faults),
         remarks: remarks::remarks(&bench.faults, smoothness, &bench.twins)
             .into_iter()
@@ -359,11 +362,12 @@ impl FaultBench {
         self.drop_rows(source, &straddles);
     }
 
-    /// What is to be said of a newest reading that stands far from those before it.
-    fn newest_alone(&self) -> Option<String> {
+    /// What is to be said of a newest reading that stands far from those before it, and is left out.
+    fn leave_out_newest_alone(&mut self) -> Option<String> {
         let trace = self.trace(Source::Benchmark);
         let off = outlier::newest_alone(&trace)?;
         let at = trace.times.last()?;
+        self.series.readings.pop();
         Some(remarks::of_newest(*at, off, self.series.unit))
     }
 

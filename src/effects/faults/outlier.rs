@@ -10,9 +10,10 @@ use std::ops::Range;
 const FEWEST: usize = 20;
 /// Neighbours looked at on either side.
 const BESIDE: usize = 5;
-/// So many one after another may be wrong, as under snow, or while somebody works at the instrument; of covariates, which change in earnest, fewer.
+/// So many displacements one after another may be wrong, as under snow, or while somebody works at the instrument; of velocities and covariates,
+/// which rise and come back in earnest, fewer.
 const TOGETHER: usize = 6;
-const TOGETHER_IN_CHANNEL: usize = 2;
+const TOGETHER_WHERE_IT_COMES_BACK: usize = 2;
 /// Readings that must follow: what the newest means nobody can know yet.
 const AFTER: usize = 2;
 /// Standard deviations about the line through the neighbours.
@@ -32,20 +33,28 @@ const LEADS_UP: f64 = 2.0;
 /// Outliers are few; where there are more, the noise has heavy tails and none is a mistake.
 const FEW: f64 = 0.02;
 
-/// Which readings of a benchmark are mistakes. At most 2 % of them, rounded up.
+/// Which readings of a benchmark are mistakes; what lies beside each other is one mistake, and no more than 2 % of the readings, rounded up, are any.
 ///
-/// The error of a velocity grows with it, so velocities must stand out by their logarithms too.
+/// The error of a velocity grows with it, so velocities must stand out by their logarithms too. The first reading is one of them where it
+/// stands alone as [`newest_alone`] has it of the newest, time run backwards: the zero of a sensor that had not been installed yet.
 pub(super) fn outlying_readings(trace: &Trace, quantity: Quantity) -> Vec<bool> {
-    let mut wrong = outlying(trace, FAR, TOGETHER);
+    let together = match quantity {
+        Quantity::Displacement => TOGETHER,
+        Quantity::Velocity => TOGETHER_WHERE_IT_COMES_BACK,
+    };
+    let mut wrong = outlying(trace, FAR, together);
     if quantity == Quantity::Velocity && trace.values.iter().all(|value| *value > 0.0) {
         let mut logarithms = trace.clone();
         for value in &mut logarithms.values {
             *value = value.ln();
         }
-        let by_factor = outlying(&logarithms, FAR, TOGETHER);
+        let by_factor = outlying(&logarithms, FAR, together);
         for (wrong, by_factor) in wrong.iter_mut().zip(by_factor) {
             *wrong &= by_factor;
         }
+    }
+    if trace.len() >= FEWEST && newest_alone(&trace.backwards()).is_some() {
+        wrong[0] = true;
     }
     wrong
 }
@@ -74,7 +83,7 @@ pub(super) fn newest_alone(trace: &Trace) -> Option<f64> {
 /// leave the range of all others by more than that range's width; smaller peaks may be weather, and
 /// those of rain and of rivers always are.
 pub(super) fn outlying_samples(trace: &Trace, nature: Nature) -> Vec<bool> {
-    let mut wrong = outlying(trace, FAR_IN_CHANNEL, TOGETHER_IN_CHANNEL);
+    let mut wrong = outlying(trace, FAR_IN_CHANNEL, TOGETHER_WHERE_IT_COMES_BACK);
     if nature.has_peaks() {
         wrong.fill(false);
         return wrong;
@@ -104,7 +113,9 @@ fn outlying(trace: &Trace, far: f64, together: usize) -> Vec<bool> {
     }
     let usual = usual_deviation(trace);
     let gap = GAP * median(&trace.intervals());
+    let most = (FEW * count as f64).ceil();
     for width in 1..=together {
+        let narrower = wrong.clone();
         for start in 1..count.saturating_sub(width + AFTER - 1) {
             let end = start + width;
             let before = trace.days[start] - trace.days[start - 1];
@@ -114,11 +125,10 @@ fn outlying(trace: &Trace, far: f64, together: usize) -> Vec<bool> {
                 wrong[start..end].fill(true);
             }
         }
-    }
-    let marked = wrong.iter().filter(|wrong| **wrong).count();
-    let most = (FEW * count as f64).ceil();
-    if marked as f64 > most {
-        wrong.fill(false);
+        let stretches = wrong.chunk_by(|a, b| a == b);
+        if stretches.filter(|stretch| stretch[0]).count() as f64 > most {
+            return narrower;
+        }
     }
     wrong
 }
@@ -231,8 +241,29 @@ mod tests {
         assert_eq!(left(&within(200..206)), 394);
         assert_eq!(left(&within(200..210)), 400);
         assert_eq!(left(&within(200..400)), 400);
+        // A spike is one though a group of six is another, and the first reading by itself is one.
+        assert_eq!(
+            left(&|day| within(200..206)(day) - within(50..51)(day) + within(0..1)(day)),
+            392
+        );
         let wave = |day: usize| 30.0 * (-(day as f64 - 200.0).powi(2) / 18.0).exp();
         assert_eq!(left(&wave), 400);
+    }
+
+    #[test]
+    fn velocities_that_rise_for_some_hours_and_come_back_are_a_surge() {
+        let left = |hours: std::ops::Range<usize>| {
+            let days = daily(400);
+            let noise = normals(&mut generator(5), days.len());
+            let values = noise.iter().enumerate();
+            let values = values.map(|(hour, noise)| {
+                (if hours.contains(&hour) { 40.0 } else { 2.0 }) + 0.2 * noise
+            });
+            let readings = series(Quantity::Velocity, &days, &values.collect::<Vec<f64>>());
+            inspect(&readings, &[]).series.readings.len()
+        };
+        assert_eq!(left(200..206), 400);
+        assert_eq!(left(200..201), 399);
     }
 
     #[test]

@@ -102,7 +102,7 @@ fn sentence(
 /// That the newest reading, which is of that time, leaves those before it by `off`, all at once.
 pub(super) fn of_newest(at: Timestamp, off: f64, unit: Unit) -> String {
     format!(
-        "The readings: the last one, of {}, is {off:+.3} {unit} off the line of those before it, all at once: a mistake of the instrument and the beginning of a motion look the same until more is read.",
+        "The readings: the last one, of {}, is {off:+.3} {unit} off the line of those before it, all at once: a mistake of the instrument and the beginning of a motion look the same until more is read, and it is left out until then.",
         date(at)
     )
 }

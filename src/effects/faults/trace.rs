@@ -55,6 +55,16 @@ impl Trace {
         }
     }
 
+    /// Time run backwards.
+    pub(super) fn backwards(&self) -> Self {
+        let last = self.days.last().copied().unwrap_or_default();
+        Self {
+            times: self.times.iter().rev().copied().collect(),
+            days: self.days.iter().rev().map(|day| last - day).collect(),
+            values: self.values.iter().rev().copied().collect(),
+        }
+    }
+
     pub(super) fn len(&self) -> usize {
         self.values.len()
     }

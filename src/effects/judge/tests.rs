@@ -126,7 +126,7 @@ fn of_jump(size: f64, days: f64, back: f64, drivers: &[Driver]) -> Option<String
         at: Some(100),
         ..term(Kind::OFFSET, Act::Reading(vec![vec![0.0; COUNT]]))
     };
-    objection(&problem, &fitted(offset, &[size]), drivers)
+    may_be_slip(&problem, &fitted(offset, &[size]), drivers)
 }
 
 #[test]

@@ -16,9 +16,10 @@ const STEADY: usize = 4;
 /// As far apart: by this share of the time between them, and by so much in any case.
 const APART: f64 = 0.25;
 const LEAST_APART: Duration = Duration::from_secs(60);
-/// What comes together comes within this time; and what comes in blocks, mostly, within the longer one.
+/// What comes together comes within this time; and what comes in blocks, mostly, within the longer one, or so many times the interval of the readings.
 const SHORT_LULL: Duration = Duration::from_secs(20);
-const LONG_LULL: Duration = Duration::from_secs(3600);
+const LONG_LULL: Duration = Duration::from_secs(3 * 3600);
+const INTERVALS: u32 = 3;
 
 /// A time without readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,6 +67,19 @@ impl LatestReadings {
         let pairs = latest.iter().zip(latest.iter().skip(1));
         let mut each = pairs.map(|(before, after)| are_as_far_apart(*before, *after));
         latest.len() == STEADY && each.all(|is_as_far| is_as_far)
+    }
+}
+
+impl LatestReadings {
+    /// The longest time between the newest two readings of a benchmark, as they were measured.
+    fn longest_interval(&self) -> Duration {
+        let newest_two = |latest: &VecDeque<(Timestamp, Stopwatch)>| {
+            let mut newest = latest.iter().rev().map(|(time, _)| *time);
+            let since = newest.next()?.duration_since(newest.next()?);
+            Duration::try_from(since).ok()
+        };
+        let each = self.0.values().filter_map(newest_two);
+        each.max().unwrap_or_default()
     }
 }
 
@@ -141,7 +155,7 @@ impl Timekeeper {
         let since = self.came?.elapsed();
         let lull = if since < SHORT_LULL {
             return None;
-        } else if since < LONG_LULL {
+        } else if since < LONG_LULL.max(INTERVALS * self.behind.longest_interval()) {
             Lull::Short
         } else {
             Lull::Long
@@ -232,8 +246,24 @@ mod tests {
             assert_eq!(keeper.in_doubt(later), short, "{hour}");
             tokio::time::advance(Duration::from_secs(3540)).await;
             let later = wall + (hour + 1).hours();
-            let long = (hour < 3).then_some(Lull::Long);
-            assert_eq!(keeper.in_doubt(later), long, "{hour}");
+            // The next of readings that come each hour is not late yet.
+            assert_eq!(keeper.in_doubt(later), short, "{hour}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_lull_is_long_after_three_hours_or_three_intervals_of_the_readings() {
+        for (apart, long) in [(10 * 60, 3 * 3600), (2 * 3600, 6 * 3600)] {
+            let (mut keeper, wall) = (Timekeeper::default(), noon() + 1000.hours());
+            for reading in 0..2 {
+                let time = noon() + (reading * apart).seconds();
+                keeper.knows(time, true);
+                keeper.comes("5", time, wall);
+            }
+            for (after, lull) in [(long - 60, Lull::Short), (120, Lull::Long)] {
+                tokio::time::advance(Duration::from_secs(after)).await;
+                assert_eq!(keeper.in_doubt(wall), Some(lull), "{apart}");
+            }
         }
     }
 

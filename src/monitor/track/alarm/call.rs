@@ -2,7 +2,8 @@
 
 use super::{Alarm, BesideForecast};
 use crate::alert::{
-    AlertCause, AlertEvidence, Entered, Policy, Transition, chance_in_words, hours_in_words,
+    AlertCause, AlertEvidence, Entered, Level, Policy, RedCourse, Transition, chance_in_words,
+    hours_in_words,
 };
 use crate::forecast::HORIZON_DAYS;
 use crate::monitor::event::{AlertState, CalledLevel, Event, EventKind, LevelChance};
@@ -220,6 +221,12 @@ fn text(
             format!("; chance {chance} within {name} ({span})")
         })
     };
+    let is_pending = change.level == Level::Orange && evidence.red == RedCourse::IsNear;
+    let pending = if is_pending && change.entered == Entered::Yes {
+        policy.pending_red_in_words()
+    } else {
+        String::new()
+    };
     let (mut outlook, mut ahead_of_outlook) = ("the outlook", hours_in_words(ahead.orange));
     if ahead.orange < policy.outlook {
         outlook = "five times the record's length";
@@ -227,7 +234,7 @@ fn text(
         ahead_of_outlook += &hours_in_words(policy.outlook);
     }
     format!(
-        "benchmark {}: {}{verb} ({}){grounds}{}{}{velocity}; the critical velocity is {} mm/day",
+        "benchmark {}: {}{verb} ({}){grounds}{}{pending}{}{velocity}; the critical velocity is {} mm/day",
         record.benchmark(),
         change.level,
         change.rule,

@@ -40,8 +40,21 @@ impl Levels {
     }
 
     /// Those so far say nothing of the slope.
-    pub(super) fn are_void_until(&mut self, now: Timestamp) {
-        self.void_until = Some(now);
+    pub(super) fn are_void(&mut self) {
+        self.void_until = self.changes.back().map(|(time, _)| *time);
+    }
+
+    /// Those of the `past` stand before these.
+    pub(super) fn go_on_from(&mut self, past: Self) {
+        let first = self.changes.front().map(|(time, _)| *time);
+        let earlier = past.changes.into_iter();
+        let mut all: VecDeque<(Timestamp, Level)> = earlier
+            .take_while(|(time, _)| first.is_none_or(|first| *time < first))
+            .chain(self.changes.drain(..))
+            .collect();
+        all.drain(..all.len().saturating_sub(MOST_LEVELS));
+        self.changes = all;
+        self.void_until = self.void_until.max(past.void_until);
     }
 
     /// Whether red was in force at `since` or later, and not in error.
@@ -56,5 +69,31 @@ impl Levels {
     pub(in crate::monitor::track) fn highest_since(&self, since: Timestamp) -> Level {
         let levels = self.since(since).map(|(_, level)| level);
         levels.max().unwrap_or(Level::Green)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::monitor::track::fixture::at;
+
+    fn of(changes: &[(i64, Level)]) -> Levels {
+        Levels {
+            changes: changes
+                .iter()
+                .map(|(day, level)| (at(*day), *level))
+                .collect(),
+            void_until: None,
+        }
+    }
+
+    #[test]
+    fn a_red_of_the_past_is_one_of_late_after_a_first_start_and_one_called_in_error_is_none() {
+        let mut own = of(&[(20, Level::Yellow)]);
+        assert!(!own.was_red_since(at(8)));
+        own.go_on_from(of(&[(5, Level::Red), (12, Level::Green)]));
+        assert!(own.was_red_since(at(8)) && !own.was_red_since(at(13)));
+        own.are_void();
+        assert!(!own.was_red_since(at(8)));
     }
 }

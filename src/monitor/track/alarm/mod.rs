@@ -178,10 +178,11 @@ impl Alarm {
     pub(super) fn go_on_from(&mut self, past: Self) -> Option<(Level, Timestamp)> {
         self.held = past.held;
         self.occurrences = past.occurrences;
-        let (level, since) = past.latch.in_force()?;
-        if level <= self.level() {
+        let in_force = past.latch.in_force();
+        let Some((level, since)) = in_force.filter(|(level, _)| *level > self.level()) else {
+            self.levels.go_on_from(past.levels);
             return None;
-        }
+        };
         (self.latch, self.levels) = (past.latch, past.levels);
         self.attention_until = past.attention_until;
         (self.kept, self.overdue) = (past.kept, past.overdue);
@@ -192,9 +193,7 @@ impl Alarm {
     pub(super) fn follow_on(&mut self, former: Self) {
         self.latch = former.latch.measured_otherwise();
         (self.levels, self.kept) = (former.levels, former.kept);
-        if let Some((_, since)) = self.latch.in_force() {
-            self.levels.are_void_until(since);
-        }
+        self.levels.are_void();
     }
 
     /// That the level in force ends because the benchmark is no longer watched.

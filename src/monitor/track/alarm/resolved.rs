@@ -1,6 +1,7 @@
 //! An alert that people end: they know why it was called, and that it is over.
 
 use super::Alarm;
+use crate::alert::Level;
 use crate::monitor::event::{AlertState, Event, EventKind};
 use crate::monitor::given::Given;
 use crate::monitor::track::record::BenchmarkRecord;
@@ -26,7 +27,9 @@ impl Alarm {
         }
         self.latch.resolve(now);
         self.levels.note(now, &self.latch);
-        self.levels.are_void_until(now);
+        if level == Level::Red {
+            self.levels.are_void();
+        }
         (self.attention_until, self.kept, self.overdue) = (None, None, None);
         self.occurrences.end();
         let by = given.by.as_deref().unwrap_or("somebody");
