@@ -116,7 +116,6 @@ impl DeclaredLaw {
     ) -> Option<Self> {
         progress(0.05);
         let mut search = ready.search(options, is_drawn);
-        search.is_declared = true;
         let null = search.null(&ready.plain)?;
         let (full, placed) = put_in(&mut search, null.clone(), causes)?;
         let mut terms = Vec::new();

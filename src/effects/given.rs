@@ -12,7 +12,7 @@ use super::options::Options;
 use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::Fitted;
-use super::search::Search;
+use super::search::{DeclaredPart, Search};
 use super::term::{Scratch, Term};
 use super::trials::{Trial, TrialBase};
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
@@ -124,6 +124,10 @@ pub(super) fn put_in(
             break;
         };
         let cause = left.swap_remove(place);
+        search.declared = match causes[cause].at {
+            Some(_) => DeclaredPart::EffectAndTime,
+            None => DeclaredPart::Effect,
+        };
         let refitted = trials.iter();
         let refitted = refitted.filter_map(|trial| search.refitted(&full, &trial.term));
         if let Some(one) = refitted.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
@@ -131,6 +135,7 @@ pub(super) fn put_in(
             placed.push(cause);
         }
     }
+    search.declared = DeclaredPart::Effect;
     Some((full, placed))
 }
 

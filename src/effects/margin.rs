@@ -3,7 +3,7 @@
 use super::definition::{Support, Trying};
 use super::judge::{may_be_slip, objection};
 use super::noise::Memory;
-use super::search::{Refitted, SIGNIFICANT, Search};
+use super::search::{DeclaredPart, Refitted, SIGNIFICANT, Search};
 
 /// So many times the usual margin of the BIC is asked of what only the shape of the readings supports: on walks of .05 to .5 of the white
 /// noise 26 of 32 false ones gained less, and none of 70 true ones.
@@ -35,7 +35,7 @@ impl Search<'_> {
         let (problem, fitted, drivers) = (self.problem, &one.fitted, self.drivers);
         objection(problem, fitted, drivers).or_else(|| {
             // Who declares an offset knows that it was the instrument.
-            let is_open = !self.is_declared;
+            let is_open = self.declared == DeclaredPart::Nothing;
             is_open.then(|| may_be_slip(problem, fitted, drivers))?
         })
     }

@@ -6,7 +6,7 @@ use super::options::Options;
 use super::problem::Problem;
 use super::refit::Fitted;
 use super::response::Driver;
-use super::search::{Search, plain};
+use super::search::{DeclaredPart, Search, plain};
 use super::term::Scratch;
 use crate::reading::{Channel, Series, Unit};
 
@@ -51,7 +51,7 @@ impl Ready {
             bank: &self.bank,
             options,
             is_drawn,
-            is_declared: false,
+            declared: DeclaredPart::Nothing,
             scratch: Scratch::default(),
             candidates: Vec::new(),
             withheld: None,

@@ -9,7 +9,7 @@ use super::noise::{Noise, Whitener};
 use super::problem::Problem;
 use super::refit::{Fitted, Start, jacobian, likeliest, refit, under_likeliest};
 use super::response::{Driver, Response};
-use super::search::{Refitted, SIGNIFICANT, Search};
+use super::search::{DeclaredPart, Refitted, SIGNIFICANT, Search};
 use super::surrogate::{Innovations, NullGains};
 use super::term::Term;
 use super::trials::{Trial, TrialBase, shortlist};
@@ -421,7 +421,8 @@ impl<'a> Search<'a> {
             candidates::EVENT_MARGIN
         };
         let inside = to >= margin && to + margin < self.problem.used;
-        inside.then(|| {
+        let may_be = inside && (to == at || self.declared != DeclaredPart::EffectAndTime);
+        may_be.then(|| {
             if term.is_jump_of_reading() {
                 return candidates::jump(self.problem, term.kind, to);
             }

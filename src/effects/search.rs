@@ -110,6 +110,17 @@ pub(super) enum OneMore {
     SlowLoad(Fitted),
 }
 
+/// What of an effect was declared by people, and is not searched for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum DeclaredPart {
+    /// Nothing.
+    Nothing,
+    /// That it is there.
+    Effect,
+    /// And when: it is not moved to another reading.
+    EffectAndTime,
+}
+
 /// A search at work.
 pub(super) struct Search<'a> {
     pub(super) problem: &'a Problem,
@@ -118,8 +129,7 @@ pub(super) struct Search<'a> {
     pub(super) options: &'a Options,
     /// Whether the values are not raw readings: smoother than any instrument's.
     pub(super) is_drawn: bool,
-    /// Whether what it judges was declared by people.
-    pub(super) is_declared: bool,
+    pub(super) declared: DeclaredPart,
     pub(super) scratch: Scratch,
     pub(super) candidates: Vec<Candidate>,
     pub(super) withheld: Option<Withheld>,

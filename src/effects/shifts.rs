@@ -4,7 +4,7 @@
 use super::judge::objection;
 use super::refit::Fitted;
 use super::response::Driver;
-use super::search::{Refitted, SIGNIFICANT, Search};
+use super::search::{DeclaredPart, Refitted, SIGNIFICANT, Search};
 use super::surrogate::{LEAST_SHIFT, WholeGains};
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -76,7 +76,7 @@ impl Search<'_> {
             bank: self.bank,
             options: self.options,
             is_drawn: self.is_drawn,
-            is_declared: false,
+            declared: DeclaredPart::Nothing,
             scratch: std::mem::take(&mut self.scratch),
             candidates: Vec::new(),
             withheld: None,

@@ -52,14 +52,20 @@ pub(super) struct SiteAlert {
 }
 
 impl SiteAlert {
-    /// Takes the benchmarks' levels; says how the site's changes.
+    /// Takes the benchmarks' levels; says how the site's changes. Where fewer than the rule asks for are still `judged`, because nothing can be said
+    /// of the others any more, all of those are enough: a site does not stay silent because its sensors have died.
     fn update(
         &mut self,
         rule: Option<SiteLevel>,
         now: Timestamp,
         in_force: &LevelsInForce,
+        judged: usize,
     ) -> Vec<Event> {
-        let level = rule.and_then(|rule| in_force.reached_by(rule.needed()));
+        let needed = |rule: SiteLevel| match in_force.unknown().len() {
+            0 => rule.needed(),
+            _ => rule.needed().min(judged.max(1)),
+        };
+        let level = rule.and_then(|rule| in_force.reached_by(needed(rule)));
         let before = self.in_force;
         if before.map(|(level, _)| level) == level {
             return Vec::new();
@@ -140,7 +146,10 @@ impl Monitor {
         let levels = || events.iter().filter_map(called);
         let mut of_site = Vec::new();
         if is_changed || levels().next().is_some() {
-            of_site.extend(self.site.update(rule, now, self.benchmarks.in_force()));
+            let in_force = self.benchmarks.in_force();
+            let all = self.benchmarks.all().len() + self.outages.awaited().count();
+            let judged = all.saturating_sub(in_force.unknown().len());
+            of_site.extend(self.site.update(rule, now, in_force, judged));
         }
         if is_changed || levels().any(|level| level == Level::Unknown) {
             let awaited = self.outages.awaited();

@@ -3,7 +3,7 @@
 mod processes;
 
 use super::many::{EarlierLevel, ManyAlerts};
-use super::sandbox::{self, CANNOT_RUN};
+use super::sandbox::{self, CANNOT_RUN, CANNOT_RUN_BECAUSE};
 use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::monitor::{AlertState, CLOCK_FAULT, Event, EventKind};
@@ -392,13 +392,13 @@ pub(super) async fn run_program(
         writer.abort();
     }
     let (stdout, stderr) = tokio::join!(finish(stdout), finish(stderr));
-    tracing::info!(hook = ?hook.run, key = alert.key, attempt, ?outcome, stdout, stderr, "hook ended");
     // What was to run it has said why it cannot.
     let cannot_run = outcome == HookOutcome::Failed(i32::from(CANNOT_RUN));
-    match stderr.lines().next_back().filter(|_| cannot_run) {
-        Some(why) => HookOutcome::NotStarted(why.to_owned()),
-        None => outcome,
-    }
+    let last = stderr.lines().next_back().filter(|_| cannot_run);
+    let why = last.and_then(|last| last.strip_prefix(CANNOT_RUN_BECAUSE));
+    let outcome = why.map_or(outcome, |why| HookOutcome::NotStarted(why.to_owned()));
+    tracing::info!(hook = ?hook.run, key = alert.key, attempt, ?outcome, stdout, stderr, "hook ended");
+    outcome
 }
 
 fn start(hook: &HookConfig, variables: &[(&str, String)], run: &str) -> Result<Child, String> {

@@ -40,15 +40,17 @@ pub enum Walls {
 
 /// A hook cannot be run: what the process ends with that was to run it, as a shell does.
 pub const CANNOT_RUN: u8 = 126;
+/// What its last line on stderr begins with then: a hook may end with that code too.
+pub const CANNOT_RUN_BECAUSE: &str = "the hook cannot be run: ";
 
 /// Why a hook could not be walled in or started.
 #[derive(Debug, thiserror::Error)]
 pub enum SandboxError {
     /// The kernel refused.
-    #[error("the hook cannot be walled in: {0}")]
+    #[error("{CANNOT_RUN_BECAUSE}it cannot be walled in: {0}")]
     Refused(#[from] RulesetError),
     /// The program cannot be run.
-    #[error("{}: {source}", .program.display())]
+    #[error("{CANNOT_RUN_BECAUSE}{}: {source}", .program.display())]
     NotStarted {
         /// The program.
         program: PathBuf,

@@ -171,6 +171,13 @@ async fn a_grandchild_that_holds_stdout_open_is_not_waited_for() {
 }
 
 #[tokio::test]
+async fn a_hook_that_ends_with_the_code_of_what_cannot_be_run_has_run() {
+    let (folder, config) = hook("echo sent > sent; echo modem slow >&2; exit 126");
+    assert_eq!(run(&config, &alert()).await, HookOutcome::Failed(126));
+    assert_eq!(read(&folder, "sent"), "sent\n");
+}
+
+#[tokio::test]
 async fn a_hook_that_is_missing_or_not_executable_is_not_started() {
     let (folder, mut config) = hook("");
     config.run = vec!["./nowhere.sh".to_owned()];

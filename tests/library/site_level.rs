@@ -116,3 +116,25 @@ fn without_a_rule_the_site_has_no_level() {
     let mut monitor = begin(None);
     assert!(of_the_site(&read(&mut monitor, "a", 1, 30.0)).is_empty());
 }
+
+#[test]
+fn where_fewer_can_be_judged_than_the_rule_asks_for_all_of_those_make_the_site() {
+    let red_after = |silent_from: i64| {
+        let mut monitor = begin(Some(SiteLevel::AtLeast(3)));
+        for hour in 1..100 {
+            for id in ["a", "b", "c"] {
+                if id != "c" || hour < silent_from {
+                    read(&mut monitor, id, hour, 0.0);
+                }
+            }
+            monitor.step(start() + hour.hours(), &Input::Tick);
+        }
+        let first = of_the_site(&read(&mut monitor, "a", 100, 30.0));
+        assert!(first.iter().all(|(level, ..)| *level != Level::Red));
+        of_the_site(&read(&mut monitor, "b", 100, 30.0))
+            .iter()
+            .any(|(level, state, _)| (*level, *state) == (Level::Red, AlertState::Firing))
+    };
+    assert!(!red_after(100), "the third can be judged and is not red");
+    assert!(red_after(30), "of the third nothing can be said any more");
+}

@@ -102,4 +102,10 @@ fn a_declared_time_that_is_not_the_one_that_fits_best_is_remarked() {
     };
     let moved = |remarks: &[String]| remarks.iter().any(|one| one.contains("it fits best at"));
     assert!(!moved(&said(0)) && moved(&said(96)), "{:?}", said(96));
+    let late = jump()
+        .at
+        .map(|at| at + jiff::SignedDuration::from_hours(15 * 24));
+    let kept = judged(&[Cause { at: late, ..jump() }, through("lake")]);
+    let at = kept.given[0].effect.as_ref().unwrap().at.unwrap();
+    assert!(days_since(late.unwrap(), at).abs() < 3.5, "{at}");
 }

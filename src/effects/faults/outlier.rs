@@ -28,6 +28,8 @@ const GAP: f64 = 3.0;
 const FEWEST_BEFORE: usize = 10;
 /// So many times as large as any of the steps before it is the step to a newest reading that has come all at once.
 const ALL_AT_ONCE: f64 = 5.0;
+/// The same of the first reading, by which no collapse begins.
+const FIRST_ALL_AT_ONCE: f64 = 3.0;
 /// A slope that accelerates to failure leads up to it: the last step before it is the largest, and so many times the usual one.
 const LEADS_UP: f64 = 2.0;
 /// Outliers are few; where there are more, the noise has heavy tails and none is a mistake.
@@ -53,7 +55,7 @@ pub(super) fn outlying_readings(trace: &Trace, quantity: Quantity) -> Vec<bool> 
             *wrong &= by_factor;
         }
     }
-    if trace.len() >= FEWEST && newest_alone(&trace.backwards()).is_some() {
+    if trace.len() >= FEWEST && last_alone(&trace.backwards(), FIRST_ALL_AT_ONCE).is_some() {
         wrong[0] = true;
     }
     wrong
@@ -62,6 +64,10 @@ pub(super) fn outlying_readings(trace: &Trace, quantity: Quantity) -> Vec<bool> 
 /// By how much the newest reading leaves the line of those before it, where it has left all at once: whether it is a mistake or the
 /// beginning of a motion only what follows can show.
 pub(super) fn newest_alone(trace: &Trace) -> Option<f64> {
+    last_alone(trace, ALL_AT_ONCE)
+}
+
+fn last_alone(trace: &Trace, all_at_once: f64) -> Option<f64> {
     let newest = trace.len().checked_sub(1)?;
     let first = newest.checked_sub(FEWEST_BEFORE)?;
     let steps = trace.values[first..].windows(2).map(|two| two[1] - two[0]);
@@ -76,7 +82,7 @@ pub(super) fn newest_alone(trace: &Trace) -> Option<f64> {
     let gaps = trace.intervals();
     let is_seen = gaps.last().is_some_and(|gap| *gap <= GAP * median(&gaps));
     let is_alone = is_far && is_seen && !leads_up;
-    (is_alone && last > ALL_AT_ONCE * largest).then_some(off)
+    (is_alone && last > all_at_once * largest).then_some(off)
 }
 
 /// Which values of a covariate are mistakes: dips out of the scatter, and peaks that

@@ -158,7 +158,7 @@ impl DataQuality {
         let latched = match level {
             Level::Green | Level::Unknown => String::new(),
             Level::Yellow | Level::Orange | Level::Red => {
-                "; the level in force stays in force".to_owned()
+                format!("; {level}, which was called before, does not end by it")
             }
         };
         let fault = fault.map_or_else(String::new, |what| format!("; the sensor gives {what}"));
