@@ -18,7 +18,7 @@ use super::trials::{Trial, TrialBase};
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
 use std::fmt;
 
-/// A declared time may be off by so many readings: clocks are, and so is what people write down.
+/// A declared time may be off by so many readings: clocks are, and so is what people write down (said of [`Cause::at`] too).
 const DECLARED_WITHIN: usize = 2;
 
 /// An effect that is known, or declared, to be there; how large it is, how late it acts, and what shape it has, is not.
@@ -28,7 +28,7 @@ pub struct Cause {
     pub kind: Kind,
     /// The covariate it works through; `None` for kinds that need none.
     pub channel: Option<String>,
-    /// When it happened, for kinds that happen once; `None` where that is not known. It is moved by [`DECLARED_WITHIN`] readings at most.
+    /// When it happened, for kinds that happen once; `None` where that is not known. It is moved by two readings at most.
     pub at: Option<Timestamp>,
 }
 
