@@ -31,6 +31,10 @@ impl Level {
     }
 }
 
+fn rounded(chance: f64) -> f64 {
+    (1000.0 * chance).round() / 1000.0
+}
+
 impl Policy {
     /// What a red that is pending waits for.
     pub fn pending_red_in_words(&self) -> String {
@@ -40,13 +44,16 @@ impl Policy {
             hours_in_words(self.red_course())
         )
     }
-}
 
-fn rounded(chance: f64) -> f64 {
-    (1000.0 * chance).round() / 1000.0
-}
+    fn chance_for_red_in_words(&self) -> String {
+        format!(
+            "chance of collapse of {} or more within {} ({}) and until the next reading",
+            self.red_chance,
+            self.red_within_in_words(),
+            hours_in_words(self.red_within())
+        )
+    }
 
-impl Policy {
     /// The condition of a rule with its figures, as words; `None` for a rule that the policy has no figure for.
     pub fn condition(&self, rule: &str, level: Level) -> Option<String> {
         let threshold = |figure: &dyn Fn(&super::Threshold) -> Option<f64>| {
@@ -59,21 +66,15 @@ impl Policy {
                 self.critical_velocity_mm_per_day
             ),
             (RED_CHANCE, Level::Orange) => format!(
-                "chance of collapse of {} or more within {} ({}) and until the next reading, which calls red, and of {} or more, but \
-                 not yet of {}, in the mean over some {}",
-                self.red_chance,
-                self.red_within_in_words(),
-                hours_in_words(self.red_within()),
+                "{}, which calls red, and of {} or more, but not yet of {}, in the mean over some {}",
+                self.chance_for_red_in_words(),
                 rounded(self.red_near_chance()),
                 rounded(self.red_mean_chance()),
                 hours_in_words(self.red_course())
             ),
             (RED_CHANCE, _) => format!(
-                "chance of collapse of {} or more within {} ({}) and until the next reading, and of {} or more in the mean over \
-                 some {}, or of {} at one reading",
-                self.red_chance,
-                self.red_within_in_words(),
-                hours_in_words(self.red_within()),
+                "{}, and of {} or more in the mean over some {}, or of {} at one reading",
+                self.chance_for_red_in_words(),
                 rounded(self.red_mean_chance()),
                 hours_in_words(self.red_course()),
                 rounded(self.red_at_once())

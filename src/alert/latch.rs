@@ -237,13 +237,13 @@ impl Latch {
         // Motion that never stood out of its error has not to slow down.
         let is_slow = self.has_slowed_to(velocity, error) || self.peak_velocity <= 0.0;
         // Many a slope pauses before it collapses: while a chance calls orange red is not over because it has.
-        let is_likely = policy.calls_orange_by_chance(evidence);
+        let is_likely = policy.orange_by_chance(evidence).is_some();
         let pauses = self.level == Level::Red && is_likely;
         let slowed = less && is_slow && !pauses;
         // A slope that has become faster since the level was called is not over it while more than nothing is called, until it has slowed
         // down to half of its highest velocity and no chance calls orange.
         let is_no_faster = velocity <= STEADY_GAIN * self.first_velocity + CLEAR * error;
-        let is_past_its_peak = velocity + error <= SLOWED_TO * self.peak_velocity && !is_likely;
+        let is_past_its_peak = self.is_at_half_of_its_peak(velocity, error) && !is_likely;
         let is_over = is_no_faster
             || is_past_its_peak
             || self.first_velocity <= 0.0
@@ -258,8 +258,12 @@ impl Latch {
         // States of earlier versions do not have the first velocity.
         let is_under_first =
             self.first_velocity <= 0.0 || velocity <= self.first_velocity + CLEAR * error;
+        self.is_at_half_of_its_peak(velocity, error) && is_under_first
+    }
+
+    fn is_at_half_of_its_peak(&self, velocity: f64, error: f64) -> bool {
         // What the error is larger than has not been seen to slow down.
-        velocity + error <= SLOWED_TO * self.peak_velocity && is_under_first
+        velocity + error <= SLOWED_TO * self.peak_velocity
     }
 
     fn reason_to_fall(

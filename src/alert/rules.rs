@@ -18,11 +18,13 @@ pub struct Call {
 }
 
 impl Policy {
-    /// Whether a chance calls orange: the one within the outlook, or that for red while red is pending.
-    pub(super) fn calls_orange_by_chance(&self, evidence: &AlertEvidence) -> bool {
+    /// The rule by which a chance calls orange: the one within the outlook, or that for red while red is pending.
+    pub(super) fn orange_by_chance(&self, evidence: &AlertEvidence) -> Option<&'static str> {
         let outlook = evidence.chance_within_outlook;
-        outlook.is_some_and(|chance| chance >= self.orange_chance)
-            || evidence.red == RedCourse::IsNear
+        if outlook.is_some_and(|chance| chance >= self.orange_chance) {
+            return Some("chance-within-outlook");
+        }
+        (evidence.red == RedCourse::IsNear).then_some(RED_CHANCE)
     }
 
     /// The most severe call that the evidence makes.
@@ -44,15 +46,10 @@ impl Policy {
                 level: Level::Red,
                 rule: RED_CHANCE.into(),
             }
-        } else if reaches(evidence.chance_within_outlook, self.orange_chance) {
+        } else if let Some(rule) = self.orange_by_chance(evidence) {
             Call {
                 level: Level::Orange,
-                rule: "chance-within-outlook".into(),
-            }
-        } else if evidence.red == RedCourse::IsNear {
-            Call {
-                level: Level::Orange,
-                rule: RED_CHANCE.into(),
+                rule: rule.into(),
             }
         } else if reaches(evidence.chance_within_outlook, self.yellow_chance) {
             Call {

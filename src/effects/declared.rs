@@ -280,9 +280,7 @@ impl Search<'_> {
             fitted,
             p_value: 1.0,
         };
-        let one = self.as_declared(&base, one, cause)?;
-        let best = self.ground(&base);
-        let best = best.and_then(|ground| fits_best_before(&ground, cause));
+        let (one, best) = self.as_declared(&base, one, cause)?;
         let fits_best = best.and_then(|at| after_days(problem.epoch, problem.t[at]));
         let (held_out, objection) = self.judged(&base, &one);
         let rejected_because = objection.map(|objection| objection.why);
@@ -300,11 +298,18 @@ impl Search<'_> {
         })
     }
 
-    /// With the chance that its kind, at the delays or times that it may have, gains as much without any effect.
-    fn as_declared(&mut self, base: &Fitted, one: Refitted, cause: &Cause) -> Option<Refitted> {
+    /// With the chance that its kind, at the delays or times that it may have, gains as much without any effect; and before which reading it would
+    /// fit best, where its time is declared.
+    fn as_declared(
+        &mut self,
+        base: &Fitted,
+        one: Refitted,
+        cause: &Cause,
+    ) -> Option<(Refitted, Option<usize>)> {
         let (count, seed) = (self.options.surrogates, self.options.seed);
         let ground = self.ground(base)?;
         let terms = shapes(&ground, cause);
+        let best = fits_best_before(&ground, cause);
         let of_noise = |kind| {
             let tried: Vec<Tried> = terms.iter().map(|term| ground.tried(term)).collect();
             let null_gains = ground.null_gains_of_noise(&tried, kind, count, seed + 1);
@@ -327,7 +332,8 @@ impl Search<'_> {
         } else {
             of_noise(Innovations::AsTheyAre)
         };
-        Some(Refitted { p_value, ..one }.judged_by_astronomy())
+        let one = Refitted { p_value, ..one }.judged_by_astronomy();
+        Some((one, best))
     }
 }
 

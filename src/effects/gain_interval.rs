@@ -9,7 +9,7 @@ use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::{Fitted, Start, jacobian, towards};
 use super::response::{Driver, Response};
-use super::term::{Scratch, Term, law_parameters};
+use super::term::{Scratch, Term, coefficients_of, law_parameters};
 
 /// 90 % quantile of chi squared with one degree of freedom, and how near to it a bound is looked for.
 const DROP: f64 = 2.706;
@@ -80,8 +80,7 @@ fn deviation(
     (index, scratch): (usize, &mut Scratch),
 ) -> Option<f64> {
     let mut columns = jacobian(problem, full, scratch);
-    let earlier: usize = full.terms[..index].iter().map(Term::coefficients).sum();
-    let own = columns.remove(law_parameters(problem) + earlier);
+    let own = columns.remove(coefficients_of(problem, &full.terms, index).start);
     let frame = super::frame::Frame::new(whitener.clone(), &own, &columns);
     let deviation = full.sigma / frame.misfit.sqrt();
     deviation.is_finite().then_some(deviation)

@@ -10,7 +10,7 @@ use super::quantiles::upper_median;
 use super::refit::{Fitted, Start, likeliest, refit};
 use super::response::Driver;
 use super::rival::Rival;
-use super::term::{Scratch, Term, law_parameters};
+use super::term::{Scratch, Term, coefficients_of, law_parameters};
 use crate::reading::{CovariateKind, Quantity};
 
 /// Velocities that are means over more of their own spacings would be smooth: their noise is shared by so many.
@@ -468,10 +468,7 @@ pub(super) fn named(term: &Term, drivers: &[Driver]) -> Rival {
 
 /// Where the coefficients of the term of that index stand among the parameters.
 pub(super) fn coefficients<'a>(problem: &Problem, fitted: &'a Fitted, index: usize) -> &'a [f64] {
-    let first = law_parameters(problem);
-    let earlier: usize = fitted.terms[..index].iter().map(Term::coefficients).sum();
-    let from = first + earlier;
-    &fitted.parameters[from..from + fitted.terms[index].coefficients()]
+    &fitted.parameters[coefficients_of(problem, &fitted.terms, index)]
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::linear::Linear;
 use super::noise::{Memory, Noise, Whitener};
 use super::prior::Prior;
 use super::problem::Problem;
-use super::term::{Scratch, Term, law_parameters, read};
+use super::term::{Scratch, Term, coefficients_of, law_parameters, read};
 use crate::fit::{Damping, Descendable, StepOutcome, descend};
 use crate::model::Driven;
 use crate::reading::Quantity;
@@ -47,6 +47,13 @@ impl Fitted {
         let terms: f64 = self.terms.iter().map(Term::parameters).sum();
         let count = law_parameters(problem) as f64 + terms + self.noise.parameters();
         self.deviance + count * (problem.used as f64).ln()
+    }
+
+    /// The parameters with nothing of the term of that index.
+    pub(super) fn parameters_without(&self, problem: &Problem, index: usize) -> Vec<f64> {
+        let mut without = self.parameters.clone();
+        without[coefficients_of(problem, &self.terms, index)].fill(0.0);
+        without
     }
 
     /// Readings less prediction, of the fitted ones.

@@ -49,6 +49,17 @@ pub(super) fn law_parameters(problem: &Problem) -> usize {
     }
 }
 
+/// Where among the parameters the coefficients of the term of that index stand.
+pub(super) fn coefficients_of(
+    problem: &Problem,
+    terms: &[Term],
+    index: usize,
+) -> std::ops::Range<usize> {
+    let earlier: usize = terms[..index].iter().map(Term::coefficients).sum();
+    let from = law_parameters(problem) + earlier;
+    from..from + terms[index].coefficients()
+}
+
 /// How the load answers to the motion, and over how long the motion is read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Feedback {

@@ -3,7 +3,7 @@
 use super::act::Act;
 use super::problem::Problem;
 use super::refit::Fitted;
-use super::term::{Scratch, Term, law_parameters};
+use super::term::Scratch;
 
 /// By which factor the velocity is higher where what enters the load through this term is one standard deviation higher, in the mean over
 /// the fitted time: the slope of the ln of the velocity with the term over that without it. `None` for what is no single column
@@ -20,9 +20,7 @@ pub(super) fn per_sd(
     let [column] = columns.as_slice() else {
         return None;
     };
-    let earlier: usize = full.terms[..index].iter().map(Term::coefficients).sum();
-    let mut without = full.parameters.clone();
-    without[law_parameters(problem) + earlier] = 0.0;
+    let without = full.parameters_without(problem, index);
     let mut velocities = |parameters: &[f64]| {
         let goes_on = scratch.predict(problem, &full.terms, parameters);
         goes_on.then(|| scratch.driven.velocity.clone())

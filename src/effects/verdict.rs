@@ -397,12 +397,7 @@ pub(super) fn contribution(
     index: usize,
     scratch: &mut Scratch,
 ) -> Vec<f64> {
-    let first = super::term::law_parameters(problem);
-    let earlier: usize = full.terms[..index].iter().map(Term::coefficients).sum();
-    let mut without = full.parameters.clone();
-    for k in 0..full.terms[index].coefficients() {
-        without[first + earlier + k] = 0.0;
-    }
+    let without = full.parameters_without(problem, index);
     let goes_on = scratch.predict(problem, &full.terms, &without);
     let most = RUNS_AWAY * full.velocity.iter().copied().fold(0.0, f64::max);
     if !goes_on || scratch.driven.velocity.iter().any(|v| *v > most) {

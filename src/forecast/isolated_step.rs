@@ -55,16 +55,13 @@ fn isolated_steps(observations: &Observations) -> Vec<(usize, f64)> {
     let is_seen = |at: usize| values[at].t_days - values[at - 1].t_days <= longest;
     let size = |at: usize| (values[at].value - values[at - 1].value).abs();
     let mut largest: Vec<usize> = (1..values.len()).collect();
-    largest.sort_unstable_by(|a, b| size(*b).total_cmp(&size(*a)));
+    let by_size = |a: &usize, b: &usize| size(*b).total_cmp(&size(*a));
+    // All steps of a long record need not be in order to know the largest.
+    largest.select_nth_unstable_by(MOST_JUMPS, by_size);
     largest.truncate(MOST_JUMPS + 1);
-    let pairs = largest
-        .windows(2)
-        .map(|two| size(two[0]) > ABOVE_OTHERS * size(two[1]));
-    let Some(last) = pairs
-        .collect::<Vec<bool>>()
-        .into_iter()
-        .rposition(|is_apart| is_apart)
-    else {
+    largest.sort_unstable_by(by_size);
+    let is_apart = |two: &[usize]| size(two[0]) > ABOVE_OTHERS * size(two[1]);
+    let Some(last) = largest.windows(2).rposition(is_apart) else {
         return Vec::new();
     };
     let sigma = displacement_sigma(values);
@@ -79,27 +76,23 @@ fn isolated_steps(observations: &Observations) -> Vec<(usize, f64)> {
         // Other jumps are no part of how the slope moves beside this one.
         let from = place.checked_sub(1).map_or(0, |before| jumps[before]);
         let until = jumps.get(place + 1).copied().unwrap_or(values.len());
+        let (before, after) = (&values[from..at], &values[at..until]);
         let fewest = if is_seen(at) {
             FEWEST_AFTER
         } else {
             FEWEST_BEFORE
         };
-        let after = values[at..until].len();
-        let sides = (&values[from..at], &values[at..until]);
-        let jump = to_take_off(sides, sigma).filter(|_| after >= fewest)?;
+        let is_known = before.len() >= FEWEST_BEFORE && after.len() >= fewest;
+        let jump = is_known.then(|| to_take_off(before, after, sigma))??;
         Some((at, jump))
     });
     each.collect()
 }
 
-/// How much, mm, of the jump between these readings `before` and `after` it is taken off; `None` where the slope moves otherwise after it, or too little is
-/// known.
-fn to_take_off((before, after): (&[Observation], &[Observation]), sigma: f64) -> Option<f64> {
+/// How much, mm, of the jump between these readings `before` and `after` it is taken off; `None` where the slope moves otherwise after it.
+fn to_take_off(before: &[Observation], after: &[Observation], sigma: f64) -> Option<f64> {
     let before = &before[before.len().saturating_sub(MOST_BESIDE)..];
     let after = &after[..after.len().min(MOST_BESIDE)];
-    if before.len() < FEWEST_BEFORE || after.len() < FEWEST_AFTER {
-        return None;
-    }
     let (usual, newest) = (rate(before), before.last()?);
     let off = |one: &Observation| one.value - newest.value - usual * (one.t_days - newest.t_days);
     let middle = |some: &[Observation]| median(&mut some.iter().map(off).collect::<Vec<f64>>());

@@ -144,18 +144,16 @@ impl Monitor {
             Some(level)
         };
         let levels = || events.iter().filter_map(called);
-        let mut of_site = Vec::new();
-        if is_changed || levels().next().is_some() {
-            let in_force = self.benchmarks.in_force();
-            let all = self.benchmarks.all().len() + self.outages.awaited().count();
-            let judged = all.saturating_sub(in_force.unknown().len());
-            of_site.extend(self.site.update(rule, now, in_force, judged));
+        if !is_changed && levels().next().is_none() {
+            return Vec::new();
         }
+        let (in_force, awaited) = (self.benchmarks.in_force(), self.outages.awaited());
+        let all = self.benchmarks.all().len() + awaited.clone().count();
+        let judged = all.saturating_sub(in_force.unknown().len());
+        let mut of_site = self.site.update(rule, now, in_force, judged);
         if is_changed || levels().any(|level| level == Level::Unknown) {
-            let awaited = self.outages.awaited();
-            let unknown = self.benchmarks.in_force().unknown().iter();
-            let unknown: Vec<&BenchmarkId> = unknown.chain(awaited.clone()).collect();
-            let all = self.benchmarks.all().len() + awaited.count();
+            let unknown = in_force.unknown().iter();
+            let unknown: Vec<&BenchmarkId> = unknown.chain(awaited).collect();
             of_site.extend(self.site.update_unknown(rule, now, &unknown, all));
         }
         of_site

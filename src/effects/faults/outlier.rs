@@ -35,7 +35,7 @@ const LEADS_UP: f64 = 2.0;
 /// Outliers are few; where there are more, the noise has heavy tails and none is a mistake.
 const FEW: f64 = 0.02;
 
-/// Which readings of a benchmark are mistakes; what lies beside each other is one mistake, and no more than 2 % of the readings, rounded up, are any.
+/// Which readings of a benchmark are mistakes. Those that lie beside each other are one; there are at most 2 mistakes in 100 readings, rounded up.
 ///
 /// The error of a velocity grows with it, so velocities must stand out by their logarithms too. The first reading is one of them where it
 /// stands alone as [`newest_alone`] has it of the newest, time run backwards: the zero of a sensor that had not been installed yet.

@@ -68,9 +68,7 @@ impl LatestReadings {
         let mut each = pairs.map(|(before, after)| are_as_far_apart(*before, *after));
         latest.len() == STEADY && each.all(|is_as_far| is_as_far)
     }
-}
 
-impl LatestReadings {
     /// The longest time between the newest two readings of a benchmark, as they were measured.
     fn longest_interval(&self) -> Duration {
         let newest_two = |latest: &VecDeque<(Timestamp, Stopwatch)>| {
