@@ -9,6 +9,8 @@ pub struct InverseVelocityLine {
     pub intercept_days: Option<f64>,
     /// Its coefficient of determination.
     pub r_squared: f64,
+    /// By how many standard errors of its slope it falls; below 0 where it rises.
+    pub falls_by_errors: f64,
 }
 
 /// Fewer points than this make no line.
@@ -109,9 +111,12 @@ impl InverseVelocityLine {
         } else {
             0.0
         };
+        let scatter = (1.0 - r_squared).max(f64::MIN_POSITIVE);
+        let freedom = (points.len() - 2) as f64;
         Some(Self {
             intercept_days,
             r_squared,
+            falls_by_errors: -slope.signum() * (freedom * r_squared / scatter).sqrt(),
         })
     }
 }

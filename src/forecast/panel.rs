@@ -240,7 +240,8 @@ pub(super) fn passages(
 
 impl Outlook {
     /// This forecast, which knows a load that was found, with `plain` beside it, which knows none. What was found may be wrong, and
-    /// then it is wrong with confidence: a quarter of the weight stays with the law that went without.
+    /// then it is wrong with confidence: a quarter of the weight stays with the law that went without. As far as the slope accelerates by the load's
+    /// clock too, the load does not account for the motion, and no chance is under that of the law that went without.
     pub(crate) fn beside(self, plain: &Self) -> Self {
         let mut regimes = BTreeMap::new();
         for (outlook, share) in [(&self, 1.0 - PLAIN_SHARE), (plain, PLAIN_SHARE)] {
@@ -250,11 +251,14 @@ impl Outlook {
         }
         let accelerating =
             (1.0 - PLAIN_SHARE) * self.accelerating + PLAIN_SHARE * plain.accelerating;
+        let unaccounted = Passage::default().pooled(&plain.chances, self.accelerating);
+        let pooled =
+            |own: &Passage, plain: &Passage| own.pooled(plain, PLAIN_SHARE).at_least(&unaccounted);
         Self {
             passage: self.passage.pooled(&plain.passage, PLAIN_SHARE),
-            collapse: self.collapse.pooled(&plain.collapse, PLAIN_SHARE),
-            expected: self.expected.pooled(&plain.expected, PLAIN_SHARE),
-            chances: self.chances.pooled(&plain.chances, PLAIN_SHARE),
+            collapse: pooled(&self.collapse, &plain.collapse),
+            expected: pooled(&self.expected, &plain.expected),
+            chances: pooled(&self.chances, &plain.chances),
             accelerating,
             regimes,
             ..self

@@ -1,7 +1,7 @@
 //! What the newest rates show by themselves.
 
 use crate::alert::AlertEvidence;
-use crate::fit::{Observations, Rate, displacement_sigma, velocity_sigma};
+use crate::fit::{Observation, Observations, Rate, displacement_sigma, velocity_sigma};
 use crate::forecast::FEWEST_READINGS;
 use crate::reading::{Quantity, Timestamp};
 
@@ -17,6 +17,10 @@ const CLEAR: f64 = 4.0;
 /// The error that the first readings may have, mm, and how many times that is taken off their motion.
 const FIRST_ERROR_MM: f64 = 20.0;
 const FIRST_ERRORS: f64 = 6.0;
+/// The coarsest and the finest last decimal place of displacements, mm, and how far, in units of it, what is written in it may lie beside.
+const COARSEST_DIGIT_MM: f64 = 1.0;
+const FINEST_DIGIT_MM: f64 = 0.001;
+const NO_DIGIT: f64 = 1e-3;
 /// A settled velocity is a new highest from this factor on.
 const HIGHER: f64 = 1.25;
 
@@ -203,15 +207,45 @@ fn newest_velocity(observations: &Observations) -> Option<f64> {
             let [.., before, newest] = values.as_slice() else {
                 return None;
             };
-            Some((newest.value - before.value) / (newest.t_days - before.t_days))
+            let step = newest.value - before.value;
+            let beyond = (step.abs() - last_digit_mm(values)).max(0.0);
+            Some(beyond.copysign(step) / (newest.t_days - before.t_days))
         }
     }
+}
+
+/// The unit of the last decimal place in which displacements are written, mm, at most [`COARSEST_DIGIT_MM`]: no reading is known better.
+fn last_digit_mm(values: &[Observation]) -> f64 {
+    let mut digit = COARSEST_DIGIT_MM;
+    let newest = &values[values.len().saturating_sub(SETTLED)..];
+    for value in newest {
+        let is_written_in = |digit: f64| {
+            let units = value.value / digit;
+            (units - units.round()).abs() <= NO_DIGIT
+        };
+        while digit > FINEST_DIGIT_MM && !is_written_in(digit) {
+            digit /= 10.0;
+        }
+    }
+    digit
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::{Observation, RateOptions};
+    use crate::fit::RateOptions;
+
+    #[test]
+    fn one_step_of_a_radar_that_gives_whole_millimetres_is_no_velocity_and_two_are_half() {
+        let newest = |values: &[f64]| {
+            let at = |(index, value): (usize, &f64)| (index as f64 / 144.0, *value);
+            let read = Observations::of_displacements(values.iter().enumerate().map(at));
+            newest_velocity(&read).unwrap()
+        };
+        assert!(newest(&[12.0, 13.0]).abs() < 1e-9 && newest(&[13.0, 12.0]).abs() < 1e-9);
+        assert!((newest(&[12.0, 14.0]) - 144.0).abs() < 1e-6);
+        assert!((newest(&[12.31, 13.31]) - 0.99 * 144.0).abs() < 1e-6);
+    }
 
     /// Slips of 6 mm each 12 hours, read by the hour: 12 mm/day.
     #[test]

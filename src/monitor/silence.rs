@@ -204,7 +204,19 @@ impl Silence {
         let between = rhythm.map_or(LEAST, |rhythm| {
             SignedDuration::from_secs(outlasted(rhythm.gap_s))
         });
-        Some(allowed.max(LEAST).max(between))
+        let apart = self.apart_now().unwrap_or(LEAST);
+        Some(allowed.max(LEAST).max(between).max(apart))
+    }
+
+    /// For how long it may be silent where it is read more seldom from now on: the two newest readings came after gaps of one length.
+    fn apart_now(&self) -> Option<SignedDuration> {
+        let mut newest = self.gaps.iter().rev();
+        let ((later, gap), (earlier, before)) = newest.next().zip(newest.next())?;
+        let is_one_after_the_other = earlier.checked_add(*before).ok()? == *later
+            && later.checked_add(*gap).ok() == self.counted_from();
+        let lengths = [before.as_secs(), gap.as_secs()];
+        (is_one_after_the_other && is_even(lengths.into_iter()))
+            .then(|| SignedDuration::from_secs(outlasted(gap.as_secs())))
     }
 
     /// Ends the silence that there is; the reading before which it began.
@@ -293,6 +305,32 @@ mod tests {
         assert_eq!(silence.deadline(), Some(at(43.0)));
         silence.begins();
         assert_eq!(silence.broken_by(at(44.0)), Some(at(39.0)));
+    }
+
+    #[test]
+    fn where_it_is_read_more_seldom_from_now_on_two_gaps_of_one_length_are_enough_to_know() {
+        let silences = |spacings: &[f64]| {
+            let mut silence = after_bursts(&[0.0, 1.7]);
+            let (mut newest, mut silences) = (1.7 + 19.0 / 12.0, 0);
+            for spacing in spacings {
+                newest += spacing;
+                if silence.deadline().is_some_and(|due| due <= at(newest)) {
+                    silence.begins();
+                    silences += 1;
+                }
+                silence.broken_by(at(newest));
+            }
+            let due = silence.deadline().unwrap();
+            (
+                silences,
+                due.duration_since(at(newest)).as_secs_f64() / 3600.0,
+            )
+        };
+        let (found, allowed) = silences(&[24.0; 12]);
+        assert!(found == 2 && allowed < 100.0, "{found} {allowed}");
+        // A gap between others of the old kind says nothing, nor do two that are not alike.
+        assert!(silences(&[24.0, 0.1, 0.1]).1 < 3.0);
+        assert!(silences(&[24.0, 10.0]).1 < 10.0);
     }
 
     #[test]

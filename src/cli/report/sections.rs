@@ -21,11 +21,13 @@ pub(super) fn summary(material: &Material, series: &Series) -> String {
     let (first, last) = span(series);
     let (levels, unknown) = levels_in(&material.events, Some(&series.benchmark), (first, last));
     let level = levels.last().map_or(Level::Green, |stretch| stretch.level);
-    let beside = unknown.last().is_some_and(|stretch| stretch.to >= last);
-    let beside = if beside { " and unknown" } else { "" };
     let since = levels.last().map_or(first, |stretch| stretch.from);
+    let unknown = unknown.last().filter(|stretch| stretch.to >= last);
+    let unknown = unknown.map_or_else(String::new, |stretch| {
+        format!(" and unknown since {}", time(Some(stretch.from)))
+    });
     let mut out = format!(
-        "{level}{beside} since {}; {} readings, {} to {}",
+        "{level} since {}{unknown}; {} readings, {} to {}",
         time(Some(since)),
         series.readings.len(),
         time(Some(first)),

@@ -18,6 +18,8 @@ use serde::Serialize;
 
 /// An intercept beyond this many lengths of the record is no prediction.
 const FARTHEST_INTERCEPT: f64 = 3.0;
+/// A line calls for attention when it falls by so many standard errors of its slope.
+const CLEARLY: f64 = 4.0;
 
 /// What refits have reported so far of a benchmark, from which the next one may differ.
 #[derive(Debug, Default, Serialize)]
@@ -84,7 +86,9 @@ impl FitChanges {
                 .and_then(|law| drift::expected_by_the_law(&law, recent(&outlook.rates), now));
             // A slope that moves backwards has no inverse velocity that meets zero.
             let is_forward = settled(&outlook.rates).is_none_or(|velocity| velocity >= 0.0);
-            if moved.to_days < moved.from_days && is_forward {
+            // Noise about a steady velocity gives a line, now and then, that meets zero.
+            let falls = predicted.line.map_or(0.0, |line| line.falls_by_errors);
+            if moved.to_days < moved.from_days && is_forward && falls >= CLEARLY {
                 causes.push(AlertCause::InterceptDriftingIn);
             }
             let kind = |from, to| EventKind::InterceptDrift {
