@@ -45,6 +45,7 @@ fn record(problem: &Problem) -> SearchedRecord<'_> {
         quantity: problem.quantity,
         epoch: problem.epoch,
         days: &problem.nodes,
+        reading_days: &problem.t,
         span_days: problem.span(),
         spacing_days: problem.spacing,
         averaging_days: problem.averaging_days,
@@ -141,7 +142,11 @@ pub(super) fn follows_season(problem: &Problem, term: &Term) -> bool {
     let Some(column) = columns.first() else {
         return false;
     };
-    let mut left = column.clone();
+    // What a rate adds up to is the covariate itself.
+    let mut left = match term.response.map(|response| response.form) {
+        Some(Form::Rate) => added_up(&problem.nodes, column),
+        Some(Form::Level) | None => column.clone(),
+    };
     let whole = dot(&left, &left);
     let mut directions: Vec<Vec<f64>> = Vec::new();
     for harmonic in harmonics(&problem.nodes, Kind::SEASONAL.definition().wave_periods) {
@@ -163,6 +168,17 @@ pub(super) fn follows_season(problem: &Problem, term: &Term) -> bool {
         directions.push(unit);
     }
     dot(&left, &left) < (1.0 - SEASONAL_SHARE) * whole
+}
+
+/// The integral of a column at these days, about its mean.
+fn added_up(days: &[f64], column: &[f64]) -> Vec<f64> {
+    let mut sum = vec![0.0; column.len()];
+    for i in 1..column.len() {
+        let mean = f64::midpoint(column[i - 1], column[i]);
+        sum[i] = sum[i - 1] + mean * (days[i] - days[i - 1]);
+    }
+    let mean = sum.iter().sum::<f64>() / sum.len().max(1) as f64;
+    sum.iter().map(|value| value - mean).collect()
 }
 
 /// What of that kind happened once, before reading `at`, in each way that it may.

@@ -2,19 +2,25 @@
 
 use super::act::Act;
 use super::companions::{go_together, is_rain};
+use super::definition::{LiesIn, Support};
 use super::judge::{block, jumps_at_once, named};
 use super::kind::Kind;
+use super::objection::{Judgement, Objection, ObjectionWeight};
 use super::prior::Prior;
 use super::refit::Fitted;
 use super::rival::Rival;
-use super::search::{Accepted, Judgement, Objection, OneMore, Refitted, SIGNIFICANT, Search};
+use super::search::{Accepted, OneMore, Refitted, SIGNIFICANT, Search};
 use super::slow::SlowFit;
+
+/// A load with this standard deviation hardly changes the velocity: by a tenth.
+const WEAK_LOAD: f64 = 0.1;
 
 impl Search<'_> {
     /// The best effect that may be added to `base`, refitted with it; an event and the mean that it is seen through are
     /// added together.
     pub(super) fn one_more(&mut self, base: &Fitted, round: usize) -> Option<OneMore> {
         (self.withheld, self.is_daily) = (None, false);
+        self.may_have_acted.clear();
         let mut refitted = self.refits(base, round)?;
         if let Some(found) = self.averaged(base, &refitted, round) {
             return Some(found);
@@ -33,12 +39,18 @@ impl Search<'_> {
         let most = (0..refitted.len()).filter(|k| open(&judged, *k));
         let most = most.map(|k| refitted[k].gain).fold(f64::MIN, f64::max);
         let slower = first.and_then(|k| self.slower(base, &refitted[k], most));
-        if let Some((_, reason)) = &slower {
-            for one in judged.iter_mut().filter(|one| one.1.is_none()) {
-                one.1 = Some(reason.clone().into());
+        if let Some((found, reason)) = &slower {
+            for (one, judged) in refitted.iter().zip(&mut judged) {
+                if judged.1.is_none() {
+                    judged.1 = Some(reason.clone().into());
+                    self.note_beside(found, one);
+                }
             }
         }
         let chosen = first.filter(|_| slower.is_none());
+        if chosen.is_none() {
+            self.note_slip_alike(&refitted, &judged);
+        }
         let ties = chosen.map(|k| self.ties(&refitted, k, &judged));
         for (k, one) in refitted.iter().enumerate() {
             let (held, objection) = judged[k].clone();
@@ -131,7 +143,13 @@ impl Search<'_> {
             return None;
         }
         let more = slow.gain - most;
-        if more < self.options.bic_margin {
+        // A covariate supports an effect by its course: where any slow course does as well, it does not.
+        let asked = if one.term.kind.definition().support == Support::Covariate {
+            -self.options.bic_margin
+        } else {
+            self.options.bic_margin
+        };
+        if more < asked {
             let less = -more;
             self.note_slow(
                 &slow,
@@ -146,10 +164,38 @@ impl Search<'_> {
             &slow,
             "nothing that was tried acts so: the load itself is not explained".to_owned(),
         );
+        let by = match more {
+            more if more >= 0.0 => format!("by {more:.0} more of the BIC"),
+            more => format!("by only {:.0} less of the BIC", -more),
+        };
         let reason = format!(
-            "a load that changes over a while, and that nothing measures, explains the same by {more:.0} more of the BIC"
+            "a load that changes over a while, and that nothing measures, explains the same {by}"
         );
-        Some((OneMore::SlowLoad(slow.fitted), reason))
+        Some((OneMore::SlowLoad(slow.fitted, slow.gain), reason))
+    }
+
+    /// Keeps `one`, refused for what was `found` instead, as a rival of it where that is a slow load that it cannot be separated from.
+    fn note_beside(&mut self, found: &OneMore, one: &Refitted) {
+        if let OneMore::SlowLoad(_, gain) = found
+            && one.gain > gain - self.options.bic_margin
+            && let Some(term) = one.fitted.terms.last()
+        {
+            self.may_have_acted.push(named(term, self.drivers));
+        }
+    }
+
+    /// Keeps the best that no chance gains and that is refused although it may have acted, as a rival of whatever is found instead.
+    fn note_slip_alike(&mut self, refitted: &[Refitted], judged: &[Judgement]) {
+        let mut each = refitted.iter().zip(judged);
+        let best = each.find(|(one, (_, objection))| {
+            let weight = objection.as_ref().map(|objection| objection.weight);
+            weight == Some(ObjectionWeight::MayHaveActed) && one.p_value < SIGNIFICANT
+        });
+        if let Some((one, _)) = best
+            && let Some(term) = one.fitted.terms.last()
+        {
+            self.may_have_acted.push(named(term, self.drivers));
+        }
     }
 
     /// The event that accounts for the readings as well as the slow load, where it may be accepted; it gains more than what had this
@@ -183,8 +229,7 @@ impl Search<'_> {
         let each = refitted.iter().zip(judged).enumerate();
         let may_be = |one: &Refitted, objection: Option<&Objection>| {
             objection.is_none_or(|objection| {
-                let is_open = objection.is_within_chance || self.may_have_acted(one);
-                is_open && one.gain >= best.gain
+                objection.weight != ObjectionWeight::Against && one.gain >= best.gain
             })
         };
         let others =
@@ -250,6 +295,32 @@ fn with_other_delays_beside(refitted: Vec<Refitted>) -> Vec<Refitted> {
     ordered
 }
 
+/// Waves of the year in the reading go before a load that hardly changes the velocity, where the BIC cannot separate them or it follows the year:
+/// most instruments come and go with the year by a few millimetres, and a response with a long memory bends a little more than waves do. What
+/// follows the year so weakly is no rarer without any effect than the waves are.
+fn prefer_the_reading(refitted: &mut [Refitted], margin: f64) {
+    let are_waves = |one: &Refitted| {
+        let definition = one.term.kind.definition();
+        definition.lies_in == LiesIn::Reading && !definition.wave_periods.is_empty()
+    };
+    let Some(place) = refitted.iter().position(are_waves) else {
+        return;
+    };
+    let is_weak = |one: &Refitted| one.load_sd().is_some_and(|sd| sd < WEAK_LOAD);
+    let (gain, p_value) = (refitted[place].gain, refitted[place].p_value);
+    for one in refitted.iter_mut() {
+        if one.follows_season && is_weak(one) {
+            one.p_value = one.p_value.max(p_value);
+        }
+    }
+    let first = &refitted[0];
+    let are_known = gain > margin && p_value < SIGNIFICANT;
+    let is_near = gain > first.gain - margin || first.follows_season && are_known;
+    if is_weak(first) && is_near {
+        refitted[..=place].rotate_right(1);
+    }
+}
+
 /// Among what the BIC cannot separate from the best, an effect that a covariate supports goes first, and then
 /// the simplest; a change of friction goes before a step of the load that hardly jumps. A covariate that follows the year goes before the bare season if it leaves the smaller error.
 fn prefer_independent_evidence(refitted: &mut [Refitted], margin: f64) {
@@ -265,6 +336,7 @@ fn prefer_independent_evidence(refitted: &mut [Refitted], margin: f64) {
             .then(simpler)
             .then(b.gain.total_cmp(&a.gain))
     });
+    prefer_the_reading(refitted, margin);
     let place = |is_so: fn(&Act) -> bool| refitted.iter().position(|one| is_so(&one.term.act));
     let step = place(|act| matches!(act, Act::Step));
     let friction = place(|act| matches!(act, Act::Friction(_)));

@@ -177,6 +177,7 @@ impl DeclaredLaw {
             candidates: self.candidates,
             withheld: None,
             has_slow_load: false,
+            may_have_acted: Vec::new(),
             is_daily: false,
         };
         let findings = findings(ready, found, verdict, options, &mut scratch);

@@ -3,6 +3,9 @@
 use super::act::{Act, harmonics, standardise};
 use crate::reading::{CovariateKind, Quantity, Timestamp, Unit};
 
+/// One year, days.
+pub(super) const YEAR: f64 = 365.25;
+
 /// What an effect is. One more is a file in `known` and a row in its table: what searches, judges, declares, reports and
 /// names effects goes by these fields.
 #[derive(Debug)]
@@ -93,6 +96,8 @@ pub struct SearchedRecord<'a> {
     pub epoch: Timestamp,
     /// Days on which the law is solved, increasing: a load acts on these.
     pub days: &'a [f64],
+    /// Days of the readings.
+    pub reading_days: &'a [f64],
     /// Days from the first reading to the last one that is fitted.
     pub span_days: f64,
     /// Median days between readings.
@@ -196,6 +201,16 @@ impl SearchedRecord<'_> {
     pub fn waves(&self, periods: &[f64]) -> Act {
         Act::Load(harmonics(self.days, periods))
     }
+
+    /// The same in the reading.
+    pub fn waves_in_reading(&self, periods: &[f64]) -> Act {
+        Act::Reading(harmonics(self.reading_days, periods))
+    }
+
+    /// Whether two years have been seen, read often enough to show what comes and goes with them.
+    pub fn shows_the_year(&self) -> bool {
+        self.span_days >= 1.95 * YEAR && self.spacing_days <= 0.2 * YEAR
+    }
 }
 
 impl EffectSize {
@@ -215,7 +230,7 @@ impl EffectSize {
         }
     }
 
-    /// The strongest of waves of these periods, days: its amplitude in log-load, and its period.
+    /// The strongest of waves of these periods, days: its amplitude, in log-load or in what the reading is measured in, and its period.
     pub fn of_waves(fitted: &FittedCoefficients, periods: &[f64]) -> Self {
         let amplitudes = fitted.values.chunks(2).map(|pair| {
             let sine = pair.get(1).copied().unwrap_or(0.0);

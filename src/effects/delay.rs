@@ -1,7 +1,11 @@
-//! A covariate's response chosen about other laws than the one that was fitted without it. That one has bent towards what the covariate
-//! does, and about it another delay explains more than the right one: about a steady law, and again about the law fitted with it.
+//! A covariate's response, and when the load steps, chosen about other laws than the one that was fitted without them. That one has bent towards what they
+//! do, and about it another delay, or time, explains more than the right one: about a steady law, and again about the law fitted with it.
 
+use super::act::Act;
+use super::candidates::once;
+use super::kind::Kind;
 use super::linear::Linear;
+use super::margin::BY_SHAPE;
 use super::noise::{Noise, Whitener};
 use super::refit::{Fitted, Start, jacobian, likeliest, plain_starts, refit, towards};
 use super::response::Driver;
@@ -20,11 +24,7 @@ impl Search<'_> {
     /// The best responses about a law at a steady rate, of those that `known` has another response of: where the covariate is what
     /// bends the readings, the law fitted without it is bent the same way. None beside effects that are in the law.
     pub(super) fn about_a_steady_law(&mut self, base: &Fitted, known: &[Trial]) -> Vec<Trial> {
-        let steady = plain_starts(self.problem).into_iter().next();
-        let white = Whitener::new(self.problem, Noise::WHITE);
-        let steady = steady
-            .filter(|_| base.terms.is_empty())
-            .and_then(|start| towards(self.problem, &start, &white, (0, &mut self.scratch)));
+        let steady = self.steady_law(base);
         let Some(ground) = steady.as_ref().and_then(|law| self.ground(law)) else {
             return Vec::new();
         };
@@ -40,6 +40,60 @@ impl Search<'_> {
         trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         trials.truncate(ABOUT_STEADY);
         trials
+    }
+
+    /// Where no event of the ground is found that gains what is asked for: the step of the load that is found about a steady law, where it
+    /// gains more than that which is known.
+    pub(super) fn with_a_step_about_a_steady_law(
+        &mut self,
+        base: &Fitted,
+        others: &mut Vec<Refitted>,
+    ) {
+        let events = others
+            .iter()
+            .filter(|one| one.term.kind.is_event_of_the_ground());
+        let most = events.map(|one| one.gain).fold(f64::MIN, f64::max);
+        if most >= BY_SHAPE * self.options.bic_margin {
+            return;
+        }
+        let Some(trial) = self.step_about_a_steady_law(base) else {
+            return;
+        };
+        let known = (others.iter()).position(|one| one.term.kind == trial.term.kind);
+        if known.is_some_and(|place| others[place].term.at == trial.term.at) {
+            return;
+        }
+        let Some(there) = self.refitted(base, &trial.term) else {
+            return;
+        };
+        match known {
+            Some(place) if others[place].gain >= there.gain => {}
+            Some(place) => others[place] = there,
+            None => others.push(there),
+        }
+    }
+
+    /// A step of the load where it explains most about a steady law: about a plain law that has bent towards it, it explains more elsewhere.
+    /// `None` where it gains nothing, or where `base` has effects.
+    fn step_about_a_steady_law(&mut self, base: &Fitted) -> Option<Trial> {
+        let steady = self.steady_law(base)?;
+        let ground = self.ground(&steady)?;
+        let mut kinds = ground.effects.iter().map(|definition| Kind::of(definition));
+        let is_step = |act: &Act| matches!(act, Act::Step);
+        let kind = kinds.find(|kind| kind.definition().once().iter().any(is_step))?;
+        let times = ground.event_times().into_iter();
+        let steps = times.flat_map(|at| once(kind, at));
+        let each = steps.map(|term| ground.trial(term));
+        let best = each.max_by(|a, b| a.gain.total_cmp(&b.gain));
+        best.filter(|best| best.gain > 0.0)
+    }
+
+    /// The steady law nearest to the readings; `None` where `base` has effects.
+    fn steady_law(&mut self, base: &Fitted) -> Option<Fitted> {
+        let start = plain_starts(self.problem).into_iter().next();
+        let start = start.filter(|_| base.terms.is_empty())?;
+        let white = Whitener::new(self.problem, Noise::WHITE);
+        towards(self.problem, &start, &white, (0, &mut self.scratch))
     }
 
     /// `one` with the response of its form that explains most; another is taken while it gains more. `None` where none does.

@@ -15,15 +15,22 @@ const CLEAR: f64 = 3.0;
 const NEWEST: usize = 3;
 /// Half of all normal numbers are smaller than so many standard deviations.
 const NORMAL_MEDIAN: f64 = 0.6745;
+/// A resolution of more than so many standard deviations is coarse.
+const COARSE: f64 = 1.0;
 /// Lags of the autocorrelation.
 pub(super) const LAGS: usize = 20;
 
-/// p-value of the runs test of signs about the median (Wald and Wolfowitz); `None` with too few of either sign.
-pub(super) fn runs(innovations: &[f64]) -> Option<f64> {
+/// p-value of the runs test of signs about the median (Wald and Wolfowitz); `None` with too few of either sign. `step` is that of the readings' resolution, in
+/// standard deviations: what lies within half of it from the median has no sign, and where it is more than one, all signs are those of the law's own slow motion
+/// past the steps.
+pub(super) fn runs(innovations: &[f64], step: f64) -> Option<f64> {
+    if step > COARSE {
+        return None;
+    }
     let middle = super::quantiles::upper_median(innovations.to_vec());
     let signs: Vec<bool> = innovations
         .iter()
-        .filter(|u| (**u - middle).abs() > 0.0)
+        .filter(|u| (**u - middle).abs() > 0.5 * step)
         .map(|u| *u > middle)
         .collect();
     let above = signs.iter().filter(|up| **up).count() as f64;

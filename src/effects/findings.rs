@@ -388,12 +388,14 @@ fn residual_tests(
         .map(|fitted| {
             let judged = Judged::of(problem, fitted, &ready.bank, scratch)?;
             let innovations = innovations(problem, fitted, judged.plain);
+            // A step of the resolution is so many times the error that it makes.
+            let step = 12.0_f64.sqrt() * problem.rounding / fitted.sigma;
             let load = judged
                 .load
                 .map(|(whitener, _)| undeclared_load(problem, fitted, whitener));
             let load = load.unwrap_or_default();
             let tests = Tests {
-                runs: runs(&innovations),
+                runs: runs(&innovations, step),
                 stoffer_toloi: stoffer_toloi(problem, &innovations),
                 load_gain: judged.load.is_some().then(|| judged.load_gain()),
                 load_sd: (!load.is_empty()).then(|| load_sd(&load)),

@@ -39,6 +39,8 @@ impl Kind {
     pub const PARTITION: Self = Self(&known::PARTITION);
     /// The reading jumps and the slope does not.
     pub const OFFSET: Self = Self(&known::OFFSET);
+    /// Harmonics of one year in the reading.
+    pub const SEASONAL_READING: Self = Self(&known::SEASONAL_READING);
     /// Temperature in the reading.
     pub const THERMAL: Self = Self(&known::THERMAL);
     /// Velocity readings are means over an interval.

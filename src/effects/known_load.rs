@@ -42,6 +42,13 @@ pub enum Part {
         /// One for each period.
         waves: Vec<Wave>,
     },
+    /// Harmonics in the reading.
+    ReadingHarmonics {
+        /// Where the phases are 0.
+        epoch: Timestamp,
+        /// One for each period.
+        waves: Vec<Wave>,
+    },
     /// The log-load steps, and stays.
     Step {
         /// When.
@@ -94,9 +101,9 @@ pub struct Filtered {
 pub struct Wave {
     /// Days.
     pub period_days: f64,
-    /// Log-load times cos of the phase.
+    /// Log-load, or mm or mm/day in the reading, times cos of the phase.
     pub cosine: f64,
-    /// Log-load times sin of the phase.
+    /// The same times sin of the phase.
     pub sine: f64,
 }
 
@@ -156,6 +163,7 @@ impl Part {
         match self {
             Self::Load { .. } => Kind::HYDROLOGICAL,
             Self::Harmonics { kind, .. } | Self::Other { kind, .. } => *kind,
+            Self::ReadingHarmonics { .. } => Kind::SEASONAL_READING,
             Self::Step { .. } => Kind::LOAD_STEP,
             Self::Offset { .. } => Kind::OFFSET,
             Self::Thermal { .. } => Kind::THERMAL,
@@ -167,7 +175,10 @@ impl Part {
         match self {
             Self::Load { filtered, .. } | Self::Thermal { filtered, .. } => Some(&filtered.channel),
             Self::Other { part, .. } => part.channel(),
-            Self::Harmonics { .. } | Self::Step { .. } | Self::Offset { .. } => None,
+            Self::Harmonics { .. }
+            | Self::ReadingHarmonics { .. }
+            | Self::Step { .. }
+            | Self::Offset { .. } => None,
         }
     }
 
@@ -178,6 +189,7 @@ impl Part {
             Self::Other { part, .. } => part.is_step(),
             Self::Load { .. }
             | Self::Harmonics { .. }
+            | Self::ReadingHarmonics { .. }
             | Self::Offset { .. }
             | Self::Thermal { .. } => false,
         }
@@ -189,7 +201,10 @@ impl Part {
                 filtered.reaches(channels, now)
             }
             Self::Other { part, .. } => part.reaches(channels, now),
-            Self::Harmonics { .. } | Self::Step { .. } | Self::Offset { .. } => true,
+            Self::Harmonics { .. }
+            | Self::ReadingHarmonics { .. }
+            | Self::Step { .. }
+            | Self::Offset { .. } => true,
         }
     }
 
@@ -199,13 +214,14 @@ impl Part {
             Self::Harmonics { epoch, waves, .. } => Some(harmonics(*epoch, waves, times)),
             Self::Step { at, size } => Some(step(*at, *size, times)),
             Self::Other { part, .. } => part.log_load(channels, times),
-            Self::Offset { .. } | Self::Thermal { .. } => None,
+            Self::Offset { .. } | Self::ReadingHarmonics { .. } | Self::Thermal { .. } => None,
         }
     }
 
     fn in_reading(&self, channels: &[&Channel], times: &[Timestamp]) -> Option<Vec<f64>> {
         match self {
             Self::Offset { at, size } => Some(step(*at, *size, times)),
+            Self::ReadingHarmonics { epoch, waves } => Some(harmonics(*epoch, waves, times)),
             Self::Thermal { filtered, gain } => filtered.times(*gain, channels, times),
             Self::Other { part, .. } => part.in_reading(channels, times),
             Self::Load { .. } | Self::Harmonics { .. } | Self::Step { .. } => None,
@@ -273,10 +289,18 @@ fn part(problem: &Problem, term: &Term, own: &[f64], drivers: &[Driver]) -> Opti
             filtered: filtered(term, drivers, &problem.nodes)?,
             gain: size,
         },
-        Act::Load(_) => waves(problem, term.kind, own)?,
+        Act::Load(_) => Part::Harmonics {
+            kind: term.kind,
+            epoch: problem.epoch,
+            waves: waves(term.kind, own)?,
+        },
         Act::Reading(_) if term.channel.is_some() => Part::Thermal {
             filtered: filtered(term, drivers, &problem.t)?,
             gain: size,
+        },
+        Act::Reading(_) if term.at.is_none() => Part::ReadingHarmonics {
+            epoch: problem.epoch,
+            waves: waves(term.kind, own)?,
         },
         Act::Reading(_) => Part::Offset {
             at: time_of(problem, term)?,
@@ -316,8 +340,8 @@ fn filtered(term: &Term, drivers: &[Driver], nodes: &[f64]) -> Option<Filtered> 
     })
 }
 
-/// The columns of a search are sqrt 2 times a cosine and a sine, for each period in turn; `None` of a load that is not made of waves.
-fn waves(problem: &Problem, kind: Kind, own: &[f64]) -> Option<Part> {
+/// The columns of a search are sqrt 2 times a cosine and a sine, for each period in turn; `None` of what is not made of waves.
+fn waves(kind: Kind, own: &[f64]) -> Option<Vec<Wave>> {
     let periods = kind.definition().wave_periods;
     if periods.is_empty() {
         return None;
@@ -329,9 +353,5 @@ fn waves(problem: &Problem, kind: Kind, own: &[f64]) -> Option<Part> {
         cosine: root * pair[0],
         sine: root * pair[1],
     });
-    Some(Part::Harmonics {
-        kind,
-        epoch: problem.epoch,
-        waves: waves.collect(),
-    })
+    Some(waves.collect())
 }

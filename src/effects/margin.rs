@@ -3,11 +3,12 @@
 use super::definition::{Support, Trying};
 use super::judge::{may_be_slip, objection};
 use super::noise::Memory;
+use super::objection::{Objection, ObjectionWeight};
 use super::search::{DeclaredPart, Refitted, SIGNIFICANT, Search};
 
 /// So many times the usual margin of the BIC is asked of what only the shape of the readings supports: on walks of .05 to .5 of the white
 /// noise 26 of 32 false ones gained less, and none of 70 true ones.
-const BY_SHAPE: f64 = 2.0;
+pub(super) const BY_SHAPE: f64 = 2.0;
 /// And a covariate with a memory of more than this share of the record must gain so many times the margin: six of 73 measured and drawn series whose
 /// covariates had nothing to do with them were put on one, at gains of 10 to 33, four of them with a memory of .39 to .50 of the record.
 const SLOW: f64 = 1.0 / 3.0;
@@ -18,39 +19,34 @@ const NEARLY_SIGNIFICANT: f64 = 0.1;
 
 impl Search<'_> {
     /// Why not, before any later block is looked at: what it gains, by chance too, and what the physics allow.
-    pub(super) fn refused_at_once(&self, one: &Refitted) -> Option<String> {
+    pub(super) fn refused_at_once(&self, one: &Refitted) -> Option<Objection> {
         let margin = self.margin(one);
         if one.gain < margin {
-            return Some(format!(
-                "the BIC falls by {:.1} only, {margin} is asked for",
-                one.gain
-            ));
-        }
-        if one.p_value >= SIGNIFICANT {
-            return Some(format!(
-                "without any effect a search gains as much in {:.0} % of cases",
-                100.0 * one.p_value
-            ));
+            let gain = one.gain;
+            return Some(format!("the BIC falls by {gain:.1} only, {margin} is asked for").into());
         }
         let (problem, fitted, drivers) = (self.problem, &one.fitted, self.drivers);
-        objection(problem, fitted, drivers).or_else(|| {
+        let by_physics = objection(problem, fitted, drivers);
+        let may_have_acted = |why| Objection {
+            why,
+            weight: ObjectionWeight::MayHaveActed,
+        };
+        if one.p_value >= SIGNIFICANT {
+            let share = 100.0 * one.p_value;
+            let why = format!("without any effect a search gains as much in {share:.0} % of cases");
+            let is_nearly = one.term.channel.is_some() && one.p_value < NEARLY_SIGNIFICANT;
+            return Some(if is_nearly && by_physics.is_none() {
+                may_have_acted(why)
+            } else {
+                why.into()
+            });
+        }
+        by_physics.map(Objection::from).or_else(|| {
             // Who declares an offset knows that it was the instrument.
             let is_open = self.declared == DeclaredPart::Nothing;
-            is_open.then(|| may_be_slip(problem, fitted, drivers))?
+            let slip = is_open.then(|| may_be_slip(problem, fitted, drivers))?;
+            slip.map(may_have_acted)
         })
-    }
-
-    /// Whether nothing speaks against a candidate but that chance gains as much too often (of a covariate), or that slip of the ground would
-    /// look the same (of a jump of the reading): it may be what acted all the same.
-    pub(super) fn may_have_acted(&self, one: &Refitted) -> bool {
-        let (problem, fitted) = (self.problem, &one.fitted);
-        if objection(problem, fitted, self.drivers).is_some() || one.gain < self.margin(one) {
-            return false;
-        }
-        if one.term.channel.is_some() {
-            return (SIGNIFICANT..NEARLY_SIGNIFICANT).contains(&one.p_value);
-        }
-        one.p_value < SIGNIFICANT && may_be_slip(problem, fitted, self.drivers).is_some()
     }
 
     /// By how much the BIC has to fall. A walk of the readings that is so small that the law takes it up leaves bends which no noise of the

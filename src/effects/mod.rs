@@ -40,6 +40,7 @@ mod choice;
 mod linear;
 mod margin;
 mod noise;
+mod objection;
 mod prior;
 mod problem;
 mod quantiles;

@@ -2,8 +2,9 @@
 //! ever be accepted: what the readings refuse of the first for that reason alone is tried with a second beside it.
 
 use super::judge::{Compared, held_out, step_errors};
+use super::objection::Judgement;
 use super::refit::Fitted;
-use super::search::{Accepted, Judgement, OneMore, Refitted, Search};
+use super::search::{Accepted, OneMore, Refitted, Search};
 
 /// Second effects that are tried beside the first.
 const MOST_SECOND: usize = 2;

@@ -55,6 +55,7 @@ impl Ready {
             scratch: Scratch::default(),
             candidates: Vec::new(),
             withheld: None,
+            may_have_acted: Vec::new(),
             is_daily: false,
             null: None,
         }

@@ -110,6 +110,7 @@ impl<'a> Search<'a> {
         let mut best = best_of_each_kind(others);
         best.truncate(MOST_OTHERS);
         let mut others = self.refit_each(base, best);
+        self.with_a_step_about_a_steady_law(base, &mut others);
         self.events_at_one_time(base, &mut others);
         // Only what passes the margin is judged by it.
         let of_noise = |kind| ground.null_gains_of_noise(&tried, kind, count, seed + 1);

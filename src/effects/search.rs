@@ -11,6 +11,7 @@ use super::judge::{
 };
 use super::kind::Kind;
 use super::noise::Whitener;
+use super::objection::{Judgement, Objection, ObjectionWeight};
 use super::options::Options;
 use super::problem::Problem;
 use super::refit::{Fitted, Start, plain_starts, refit_every_memory};
@@ -78,36 +79,18 @@ pub(super) struct SearchResult {
     pub(super) withheld: Option<Withheld>,
     /// Whether a load that nothing measures accounts for what is left better than any effect.
     pub(super) has_slow_load: bool,
+    /// Of what was refused in the last round, what may have acted all the same.
+    pub(super) may_have_acted: Vec<Rival>,
     /// Whether a daily cycle is left that may be a tide's, melt water's or the instrument's.
     pub(super) is_daily: bool,
-}
-
-/// What was said of a candidate: its held-out error over that without it, and why it is refused.
-pub(super) type Judgement = (Option<f64>, Option<Objection>);
-
-/// Why a candidate is refused.
-#[derive(Debug, Clone)]
-pub(super) struct Objection {
-    pub(super) why: String,
-    /// Whether it is the later block alone that speaks against it, by no more than chance may in so few readings.
-    pub(super) is_within_chance: bool,
-}
-
-impl From<String> for Objection {
-    fn from(why: String) -> Self {
-        Self {
-            why,
-            is_within_chance: false,
-        }
-    }
 }
 
 /// What may be added to a law.
 pub(super) enum OneMore {
     /// Effects, the law refitted with them.
     Effect(Fitted, Vec<Accepted>),
-    /// No effect: a load that nothing measures, with which the law was refitted, explains more than any.
-    SlowLoad(Fitted),
+    /// No effect: a load that nothing measures, with which the law was refitted, explains more than any. And what it gains.
+    SlowLoad(Fitted, f64),
 }
 
 /// What of an effect was declared by people, and is not searched for.
@@ -135,6 +118,8 @@ pub(super) struct Search<'a> {
     pub(super) withheld: Option<Withheld>,
     /// Whether a tide was refused in this round because a daily cycle explains the same.
     pub(super) is_daily: bool,
+    /// Of what was refused in this round, what may have acted all the same: a slow load cannot be separated from it, or slip looks the same.
+    pub(super) may_have_acted: Vec<Rival>,
     /// The law without any effect, by which all effects together are judged.
     pub(super) null: Option<Fitted>,
 }
@@ -167,6 +152,16 @@ impl Refitted {
     pub(super) fn hardly_jumps(&self) -> bool {
         let size = self.fitted.parameters.last();
         matches!(self.term.act, Act::Step) && size.is_some_and(|size| size.abs() < LEAST_JUMP)
+    }
+
+    /// The standard deviation of its log-load; `None` where it is none.
+    pub(super) fn load_sd(&self) -> Option<f64> {
+        let Act::Load(columns) = &self.term.act else {
+            return None;
+        };
+        let parameters = &self.fitted.parameters;
+        let own = &parameters[parameters.len() - columns.len()..];
+        Some(own.iter().map(|gain| gain * gain).sum::<f64>().sqrt())
     }
 
     /// Whether it is the same effect, with whatever delay.
@@ -242,7 +237,7 @@ impl Search<'_> {
             self.null = Some(null.clone());
             let (next, how) = match self.one_more(&full, round) {
                 Some(OneMore::Effect(next, how)) => (next, how),
-                Some(OneMore::SlowLoad(next)) => (next, Vec::new()),
+                Some(OneMore::SlowLoad(next, _)) => (next, Vec::new()),
                 None => break,
             };
             if let Some(better) = self.better_without(&full, &next) {
@@ -268,6 +263,7 @@ impl Search<'_> {
             candidates: self.candidates,
             withheld: self.withheld,
             has_slow_load,
+            may_have_acted: self.may_have_acted,
             is_daily: self.is_daily,
         })
     }
@@ -292,7 +288,7 @@ impl Search<'_> {
     /// Why not; `None` for what may be accepted. The held-out error with it over that without comes first.
     pub(super) fn judged(&mut self, base: &Fitted, one: &Refitted) -> Judgement {
         if let Some(reason) = self.refused_at_once(one) {
-            return (None, Some(reason.into()));
+            return (None, Some(reason));
         }
         if let Some(reason) = self.daily_instead(base, one) {
             return (None, Some(reason.into()));
@@ -420,9 +416,14 @@ impl Search<'_> {
         let share = share_grown_to(self.problem, before, after)?;
         // So much do the squares of so few errors grow at a likelihood that may be accepted.
         let readings = self.problem.t.len() - held.from;
+        let is_within_chance = (share / 100.0).powi(2) <= 1.0 + WORSE / readings as f64;
         Some(Objection {
             why: format!("from reading to reading the held-out error grows to {share:.0} %"),
-            is_within_chance: (share / 100.0).powi(2) <= 1.0 + WORSE / readings as f64,
+            weight: if is_within_chance {
+                ObjectionWeight::WithinChance
+            } else {
+                ObjectionWeight::Against
+            },
         })
     }
 

@@ -80,6 +80,7 @@ impl Search<'_> {
             scratch: std::mem::take(&mut self.scratch),
             candidates: Vec::new(),
             withheld: None,
+            may_have_acted: Vec::new(),
             is_daily: false,
             null: None,
         };

@@ -83,6 +83,9 @@ pub(super) fn conclude(
     let ties = accepted.iter().flat_map(|how| how.ties.iter().cloned());
     cannot_separate_from.extend(ties);
     let mut effects = effects_of(ready, &full, &accepted, scratch);
+    if found.has_slow_load || effects.is_empty() {
+        cannot_separate_from.append(&mut found.may_have_acted);
+    }
     left |= effects.is_empty() && refused(&found.candidates, margin);
     let memory_gain = judged.as_ref().map_or(0.0, Judged::memory_gain);
     let remembers = memory_gain > margin && may_remember(&full);

@@ -245,6 +245,7 @@ fn every_row_is_written_and_read_back_by_a_name_of_its_own() {
             "partition",
             "offset",
             "thermal",
+            "seasonal-reading",
             "interval-mean",
             "correlated-noise",
             "unexplained",

@@ -11,6 +11,7 @@ mod effects_faults;
 mod effects_groups;
 mod effects_measured;
 mod effects_monitor;
+mod effects_of_the_year;
 mod effects_searches;
 mod effects_table;
 mod few_readings;

@@ -27,7 +27,27 @@ fn p_values(problem: &Problem, memory: f64, test: fn(&Problem, &[f64]) -> Option
 }
 
 fn of_runs(_: &Problem, innovations: &[f64]) -> Option<f64> {
-    runs(innovations)
+    runs(innovations, 0.0)
+}
+
+/// The p-value of the runs of readings of a slope that creeps by a standard deviation of the noise in 100 days, rounded to `step` of these.
+fn of_rounded(step: f64) -> (f64, Option<f64>) {
+    let creep = |day: usize| 0.01 * day as f64;
+    let noise = normals(&mut generator(3), 800);
+    let left = noise.iter().enumerate().map(|(day, noise)| {
+        let read = ((creep(day) + noise) / step).round() * step;
+        read - creep(day)
+    });
+    let left: Vec<f64> = left.collect();
+    (runs(&left, 0.0).unwrap(), runs(&left, step))
+}
+
+#[test]
+fn readings_on_one_step_of_their_resolution_that_the_law_moves_past_have_no_sign() {
+    let (as_read, coarse) = of_rounded(2.5);
+    assert!(as_read < 1e-6 && coarse.is_none(), "{as_read} {coarse:?}");
+    let (_, fine) = of_rounded(0.5);
+    assert!(fine.unwrap() > 0.01, "{fine:?}");
 }
 
 /// The largest distance of their distribution from the uniform one (Kolmogorov).
@@ -89,7 +109,7 @@ fn readings_on_either_side_of_a_gap_are_correlated_at_their_own_distance() {
 fn too_few_readings_are_not_tested() {
     let problem = steady(Quantity::Displacement, &daily(20), 1);
     let values = normals(&mut generator(6), 12);
-    assert!(runs(&values).is_none());
+    assert!(runs(&values, 0.0).is_none());
     assert!(stoffer_toloi(&problem, &values).is_none());
 }
 

@@ -11,6 +11,7 @@ mod offset;
 mod partition;
 mod rate_limit;
 mod seasonal;
+mod seasonal_reading;
 mod state_reset;
 mod thermal;
 mod tide;
@@ -28,6 +29,7 @@ pub(super) use offset::OFFSET;
 pub(super) use partition::PARTITION;
 pub(super) use rate_limit::RATE_LIMIT;
 pub(super) use seasonal::SEASONAL;
+pub(super) use seasonal_reading::SEASONAL_READING;
 pub(super) use state_reset::STATE_RESET;
 pub(super) use thermal::THERMAL;
 pub(super) use tide::TIDE;
@@ -46,6 +48,7 @@ pub static EFFECTS: &[&EffectDefinition] = &[
     &PARTITION,
     &OFFSET,
     &THERMAL,
+    &SEASONAL_READING,
     &INTERVAL_MEAN,
     &CORRELATED_NOISE,
     &UNEXPLAINED,

@@ -1,27 +1,25 @@
 //! The year in the load.
 
 use crate::effects::act::Act;
-use crate::effects::definition::{EffectDefinition, EffectSize, SearchedRecord, Trying};
+use crate::effects::definition::{EffectDefinition, EffectSize, SearchedRecord, Trying, YEAR};
 
-/// One year, days.
-const YEAR: f64 = 365.25;
 /// A year and half a year, days.
-const PERIODS: [f64; 2] = [YEAR, 0.5 * YEAR];
+pub(super) const YEARLY: [f64; 2] = [YEAR, 0.5 * YEAR];
 
 pub(in crate::effects) static SEASONAL: EffectDefinition = EffectDefinition {
     name: "seasonal",
     what: "Harmonics of one year in the log-load.",
     title: "a load that comes and goes with the year",
     trying: Trying::AllAlong(acts),
-    wave_periods: &PERIODS,
-    size: |fitted| EffectSize::of_waves(fitted, &PERIODS),
+    wave_periods: &YEARLY,
+    size: |fitted| EffectSize::of_waves(fitted, &YEARLY),
     ..EffectDefinition::PLAIN
 };
 
 /// One wave and two, where two cycles have been seen.
 fn acts(record: &SearchedRecord) -> Vec<Act> {
-    if record.span_days < 1.95 * YEAR || record.spacing_days > 0.2 * YEAR {
+    if !record.shows_the_year() {
         return Vec::new();
     }
-    vec![record.waves(&PERIODS[..1]), record.waves(&PERIODS)]
+    vec![record.waves(&YEARLY[..1]), record.waves(&YEARLY)]
 }
