@@ -305,6 +305,7 @@ fn truth(
             Instrument::RandomWalk { noises, .. } => noise.correlated = noises * slope.noise,
             Instrument::Offset { .. }
             | Instrument::Thermal { .. }
+            | Instrument::Yearly { .. }
             | Instrument::IntervalMean { .. } => {}
         }
     }
@@ -312,11 +313,14 @@ fn truth(
         let mut truth = one.truth;
         match one.place {
             Place::Instrument(
-                Instrument::Offset { noises, .. } | Instrument::Thermal { noises, .. },
+                Instrument::Offset { noises, .. }
+                | Instrument::Thermal { noises, .. }
+                | Instrument::Yearly { noises, .. },
             ) => {
                 let gain = noises * slope.noise;
                 truth.gain_per_sd = (truth.effect == Kind::THERMAL).then_some(gain);
-                truth.size = (truth.effect == Kind::OFFSET).then_some(gain);
+                let has_size = [Kind::OFFSET, Kind::SEASONAL_READING].contains(&truth.effect);
+                truth.size = has_size.then_some(gain);
             }
             // Where the slope slips so many mm instead of 1, the load falls by so much less for each.
             Place::SlopeEffect(

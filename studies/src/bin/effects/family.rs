@@ -49,7 +49,7 @@ pub(crate) struct Recipe {
 }
 
 impl Family {
-    pub(crate) const ALL: [Self; 16] = [
+    pub(crate) const ALL: [Self; 17] = [
         Self::Of(Kind::HYDROLOGICAL),
         Self::Of(Kind::SEASONAL),
         Self::Of(Kind::TIDE),
@@ -66,6 +66,7 @@ impl Family {
         Self::Of(Kind::NONE),
         Self::Mixed,
         Self::Outside,
+        Self::Of(Kind::SEASONAL_READING),
     ];
 
     pub(crate) fn name(self) -> &'static str {
@@ -105,7 +106,7 @@ impl Family {
             }
         };
         let any = |wanted: &[Kind]| kinds.iter().any(|kind| wanted.contains(kind));
-        let need = if any(&[Kind::SEASONAL]) {
+        let need = if any(&[Kind::SEASONAL, Kind::SEASONAL_READING]) {
             Need::SEASON
         } else if any(&[Kind::TIDE]) {
             Need::TIDE
@@ -119,6 +120,7 @@ impl Family {
         } else if any(&[
             Kind::OFFSET,
             Kind::THERMAL,
+            Kind::SEASONAL_READING,
             Kind::CORRELATED_NOISE,
             Kind::PARTITION,
         ]) {

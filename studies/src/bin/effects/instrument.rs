@@ -3,7 +3,7 @@
 use super::chance::{count, log_uniform, normal, sign, so, uniform};
 use super::scene::{Planned, Scene};
 use super::truth::TrueEffect;
-use super::weather::{Covariate, Response, moments};
+use super::weather::{Covariate, Response, YEAR, moments};
 use rand_pcg::Pcg64;
 use slipwatch::effects::Kind;
 use slipwatch::model::Load;
@@ -15,6 +15,8 @@ pub(crate) enum Instrument {
     Offset { day: f64, noises: f64 },
     /// One value a reading, of unit variance, times so much.
     Thermal { shape: Vec<f64>, noises: f64 },
+    /// A wave of the year that is 0 on that day and rises.
+    Yearly { day: f64, noises: f64 },
     /// Velocities are means over so many days before.
     IntervalMean { window: f64 },
     /// AR(1) of this memory in days.
@@ -31,6 +33,7 @@ pub(crate) fn plan(rng: &mut Pcg64, scene: &Scene, kind: Kind) -> Option<Vec<Pla
     match kind.name() {
         "offset" => offsets(rng, scene),
         "thermal" => thermal(rng, scene).map(|one| vec![one]),
+        "seasonal-reading" => yearly(rng, scene).map(|one| vec![one]),
         "interval-mean" => Some(vec![interval_mean(rng, scene)]),
         "correlated-noise" => Some(vec![noise(rng, scene)]),
         _ => None,
@@ -102,6 +105,17 @@ fn thermal(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
     ))
 }
 
+fn yearly(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
+    let noises = log_uniform(rng, 2.0, 8.0);
+    let mut truth = TrueEffect::of(Kind::SEASONAL_READING);
+    truth.period_days = Some(YEAR);
+    truth.unit = Some("mm".to_owned());
+    truth.rms_over_noise = noises * std::f64::consts::FRAC_1_SQRT_2;
+    let day = uniform(rng, 0.0, YEAR);
+    let planned = Planned::instrument(Instrument::Yearly { day, noises }, truth);
+    (scene.length() > 2.5 * YEAR).then_some(planned)
+}
+
 fn interval_mean(rng: &mut Pcg64, scene: &Scene) -> Planned {
     let window = log_uniform(rng, 2.0, 20.0).round() * scene.schedule.interval;
     let mut truth = TrueEffect::of(Kind::INTERVAL_MEAN);
@@ -138,6 +152,10 @@ impl Instrument {
                 Some(days.iter().map(jump).collect())
             }
             Self::Thermal { shape, noises } => Some(shape.iter().map(|one| one * noises).collect()),
+            Self::Yearly { day, noises } => {
+                let phase = |one: &f64| std::f64::consts::TAU * (one - day) / YEAR;
+                Some(days.iter().map(|one| noises * phase(one).sin()).collect())
+            }
             Self::IntervalMean { .. } => None,
             Self::Remembering { memory, noises } => Some(remembering(rng, days, *memory, *noises)),
             Self::RandomWalk { interval, noises } => {

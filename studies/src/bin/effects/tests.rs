@@ -127,7 +127,12 @@ fn each_family(range: Range, mut see: impl FnMut(Family, &Drawn)) {
 fn every_effect_of_the_motion_shows_over_the_noise() {
     each_family(Range::Dev, |family, one| {
         for effect in &one.truth.effects {
-            let of_the_reading = [Kind::OFFSET, Kind::THERMAL, Kind::CORRELATED_NOISE];
+            let of_the_reading = [
+                Kind::OFFSET,
+                Kind::THERMAL,
+                Kind::SEASONAL_READING,
+                Kind::CORRELATED_NOISE,
+            ];
             let least = if of_the_reading.contains(&effect.effect) {
                 1.0
             } else {
