@@ -40,14 +40,13 @@ impl Search<'_> {
         let most = most.map(|k| refitted[k].gain).fold(f64::MIN, f64::max);
         let slower = first.and_then(|k| self.slower(base, &refitted[k], most));
         if let Some((found, reason)) = &slower {
-            for (one, judged) in refitted.iter().zip(&mut judged) {
-                if judged.1.is_none() {
-                    judged.1 = Some(reason.clone().into());
-                    self.note_beside(found, one);
-                }
-            }
+            self.refuse_beside(found, reason, refitted.iter().zip(&mut judged));
         }
-        let chosen = first.filter(|_| slower.is_none());
+        let beside = slower
+            .as_ref()
+            .and_then(|_| self.first_of(&refitted, &judged));
+        let slower = slower.filter(|_| beside.is_none());
+        let chosen = beside.or(first.filter(|_| slower.is_none()));
         if chosen.is_none() {
             self.note_slip_alike(&refitted, &judged);
         }
@@ -172,6 +171,22 @@ impl Search<'_> {
             "a load that changes over a while, and that nothing measures, explains the same {by}"
         );
         Some((OneMore::SlowLoad(slow.fitted, slow.gain), reason))
+    }
+
+    /// Refuses what is open for what was `found` instead; but for what no slow load looks like, where that was found.
+    fn refuse_beside<'b>(
+        &mut self,
+        found: &OneMore,
+        reason: &str,
+        each: impl Iterator<Item = (&'b Refitted, &'b mut Judgement)>,
+    ) {
+        for (one, judged) in each.filter(|(_, judged)| judged.1.is_none()) {
+            let is_alike = one.term.kind.definition().may_be_a_slow_load;
+            if is_alike || matches!(found, OneMore::Effect(..)) {
+                judged.1 = Some(reason.to_owned().into());
+                self.note_beside(found, one);
+            }
+        }
     }
 
     /// Keeps `one`, refused for what was `found` instead, as a rival of it where that is a slow load that it cannot be separated from.

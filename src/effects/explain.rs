@@ -5,6 +5,7 @@ use super::daily::{self, has_daily_tide};
 use super::explanation::{Candidate, Effect, Explained, Explanation, SettingsReport};
 use super::faults::inspect;
 use super::findings::{Findings, findings};
+use super::forms;
 use super::kind::{FaultKind, Kind};
 use super::options::Options;
 use super::outlook::forecast_change;
@@ -200,6 +201,7 @@ fn look(
         remarks.push(daily::REMARK.to_owned());
     }
     let findings = findings(&ready, found, verdict, options, &mut scratch);
+    remarks.extend(forms::left_open(&findings, options.bic_margin));
     if !is_drawn {
         return (findings, remarks);
     }

@@ -18,6 +18,7 @@ mod explain;
 mod explanation;
 mod faults;
 mod findings;
+mod forms;
 mod frame;
 mod fresh;
 mod gain_interval;

@@ -11,12 +11,18 @@ const NOISE: f64 = 0.2;
 
 /// What is said of a slope that moves by 1 mm/day under no load, and by e to the load times as much under one.
 fn under(log_load: impl Fn(f64) -> f64, seed: u64) -> Explanation {
+    under_and_set_back(log_load, seed, f64::INFINITY)
+}
+
+/// The same of an instrument that is set back by 20 mm on that day.
+fn under_and_set_back(log_load: impl Fn(f64) -> f64, seed: u64, at: f64) -> Explanation {
     let days = daily(DAYS);
     let noise = normals(&mut generator(seed), DAYS);
     let mut moved = 0.0;
     let values = days.iter().zip(noise).map(|(day, noise)| {
         moved += log_load(*day).exp();
-        moved + NOISE * noise
+        let set_back = if *day >= at { 20.0 } else { 0.0 };
+        moved + NOISE * noise - set_back
     });
     let values: Vec<f64> = values.collect();
     let series = series(Quantity::Displacement, &days, &values);
@@ -47,4 +53,12 @@ fn a_load_that_stepped_up_is_called_an_event_of_its_date() {
     let first = crate::effects::fixture::epoch();
     let day = crate::reading::days_since(first, at);
     assert!((day - 140.0).abs() < 2.0, "{day}");
+}
+
+#[test]
+fn a_jump_of_the_reading_is_found_beside_a_load_that_nothing_measures() {
+    let said = under_and_set_back(|day| ((day - 100.0) / 90.0).clamp(0.0, 1.0), 1, 220.0);
+    assert_eq!(said.verdict.effect, Kind::OFFSET, "{:?}", said.verdict);
+    let size = said.verdict.size.unwrap();
+    assert!((size + 20.0).abs() < 1.0, "{size}");
 }
