@@ -20,6 +20,7 @@ mod office;
 mod parquet;
 mod plot_cli;
 mod progress;
+mod readme;
 mod record;
 mod replay_config;
 mod report_cli;
