@@ -12,6 +12,8 @@ use super::rival::Rival;
 use super::search::{Accepted, OneMore, Refitted, SIGNIFICANT, Search};
 use super::slow::SlowFit;
 
+/// Instruments, mounts and the air come and go with the year by no more than this, mm.
+const MOST_OF_AN_INSTRUMENT_MM: f64 = 5.0;
 /// A load with this standard deviation hardly changes the velocity: by a tenth.
 const WEAK_LOAD: f64 = 0.1;
 
@@ -311,14 +313,16 @@ fn with_other_delays_beside(refitted: Vec<Refitted>) -> Vec<Refitted> {
 }
 
 /// Waves of the year in the reading go before a load that hardly changes the velocity, where the BIC cannot separate them or it follows the year:
-/// most instruments come and go with the year by a few millimetres, and a response with a long memory bends a little more than waves do. What
-/// follows the year so weakly is no rarer without any effect than the waves are.
+/// most instruments do so by a few millimetres, and a response with a long memory bends a little more than waves do. What
+/// follows the year so weakly is no rarer without any effect than the waves are. They go before any load that follows the year where they explain more.
 fn prefer_the_reading(refitted: &mut [Refitted], margin: f64) {
     let are_waves = |one: &Refitted| {
         let definition = one.term.kind.definition();
         definition.lies_in == LiesIn::Reading && !definition.wave_periods.is_empty()
     };
-    let Some(place) = refitted.iter().position(are_waves) else {
+    let may_be_theirs =
+        |one: &Refitted| are_waves(one) && one.wave_amplitude() <= MOST_OF_AN_INSTRUMENT_MM;
+    let Some(place) = refitted.iter().position(may_be_theirs) else {
         return;
     };
     let is_weak = |one: &Refitted| one.load_sd().is_some_and(|sd| sd < WEAK_LOAD);
@@ -330,8 +334,9 @@ fn prefer_the_reading(refitted: &mut [Refitted], margin: f64) {
     }
     let first = &refitted[0];
     let are_known = gain > margin && p_value < SIGNIFICANT;
-    let is_near = gain > first.gain - margin || first.follows_season && are_known;
-    if is_weak(first) && is_near {
+    let follows = first.follows_season && are_known;
+    let is_near = gain > first.gain - margin || follows;
+    if is_weak(first) && is_near || follows && gain > first.gain {
         refitted[..=place].rotate_right(1);
     }
 }

@@ -156,12 +156,22 @@ impl Refitted {
 
     /// The standard deviation of its log-load; `None` where it is none.
     pub(super) fn load_sd(&self) -> Option<f64> {
-        let Act::Load(columns) = &self.term.act else {
-            return None;
-        };
+        let is_load = matches!(self.term.act, Act::Load(_));
+        let squares = self.own().iter().map(|gain| gain * gain);
+        is_load.then(|| squares.sum::<f64>().sqrt())
+    }
+
+    /// The amplitude of the largest of its waves, each of which has a cosine and a sine, times the root of two.
+    pub(super) fn wave_amplitude(&self) -> f64 {
+        let waves = self.own().chunks(2);
+        let sizes = waves.map(|wave| wave.iter().map(|one| 2.0 * one * one).sum::<f64>().sqrt());
+        sizes.fold(0.0, f64::max)
+    }
+
+    /// Its own coefficients.
+    fn own(&self) -> &[f64] {
         let parameters = &self.fitted.parameters;
-        let own = &parameters[parameters.len() - columns.len()..];
-        Some(own.iter().map(|gain| gain * gain).sum::<f64>().sqrt())
+        &parameters[parameters.len() - self.term.coefficients()..]
     }
 
     /// Whether it is the same effect, with whatever delay.
