@@ -14,6 +14,11 @@ use super::slow::SlowFit;
 
 /// Instruments, mounts and the air come and go with the year by no more than this, mm.
 const MOST_OF_AN_INSTRUMENT_MM: f64 = 5.0;
+/// So many margins of the BIC a response with a long memory may gain more than waves by bending.
+const BENT: f64 = 3.0;
+/// A covariate leads a slow load by so much of the margin. Of four drawn slopes that fail by a power law three led it by less, or not at all; a lake
+/// that is drawn down once leads it by nine tenths.
+const LEADS_A_SLOW_LOAD: f64 = 0.5;
 /// A load with this standard deviation hardly changes the velocity: by a tenth.
 const WEAK_LOAD: f64 = 0.1;
 
@@ -144,13 +149,13 @@ impl Search<'_> {
             return None;
         }
         let more = slow.gain - most;
-        // A covariate supports an effect by its course: where any slow course does as well, it does not.
+        // A covariate supports an effect by its course: where any slow course does nearly as well, it does not.
         let asked = if one.term.kind.definition().support == Support::Covariate {
-            -self.options.bic_margin
+            -LEADS_A_SLOW_LOAD
         } else {
-            self.options.bic_margin
+            1.0
         };
-        if more < asked {
+        if more < asked * self.options.bic_margin {
             let less = -more;
             self.note_slow(
                 &slow,
@@ -335,7 +340,7 @@ fn prefer_the_reading(refitted: &mut [Refitted], margin: f64) {
     let first = &refitted[0];
     let are_known = gain > margin && p_value < SIGNIFICANT;
     let follows = first.follows_season && are_known;
-    let is_near = gain > first.gain - margin || follows;
+    let is_near = gain > first.gain - margin || follows && gain > first.gain - BENT * margin;
     if is_weak(first) && is_near || follows && gain > first.gain {
         refitted[..=place].rotate_right(1);
     }

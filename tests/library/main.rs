@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod alerts_by_crisis;
+mod covariates_or_slow_loads;
 mod crises;
 mod crisis;
 mod declared;
