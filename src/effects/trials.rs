@@ -139,7 +139,15 @@ impl TrialBase<'_> {
 
     /// Everything that needs no covariate, with the directions it adds.
     pub(super) fn of_itself(&self) -> (Vec<Trial>, Vec<Tried>) {
-        let is_new = |kind: &Kind| self.present.iter().all(|term| term.kind != *kind);
+        // Of waves of one period, in the load and in the reading, one is enough.
+        let is_new = |kind: &Kind| {
+            let waves = kind.definition().wave_periods;
+            let is_there = |term: &Term| {
+                let present = term.kind.definition().wave_periods;
+                term.kind == *kind || !waves.is_empty() && waves.first() == present.first()
+            };
+            !self.present.iter().any(is_there)
+        };
         let mut terms = Vec::new();
         for kind in self.kinds().filter(is_new) {
             terms.extend(all_along(self.problem, kind));
