@@ -126,9 +126,9 @@ pub(super) fn all_along(problem: &Problem, kind: Kind) -> Vec<Term> {
     acts.into_iter().map(|act| plain(kind, act)).collect()
 }
 
-/// Whether the record shows the year.
-pub(super) fn shows_the_year(problem: &Problem) -> bool {
-    !all_along(problem, Kind::SEASONAL).is_empty()
+/// Whether two years have been read.
+pub(super) fn are_two_years(problem: &Problem) -> bool {
+    record(problem).shows_the_year()
 }
 
 /// Whether a covariate's response mostly repeats itself from year to year: a year's harmonics hold this share of it.
@@ -136,7 +136,7 @@ pub(super) fn follows_season(problem: &Problem, term: &Term) -> bool {
     let (Act::Load(columns), Some(_)) = (&term.act, term.channel) else {
         return false;
     };
-    if !shows_the_year(problem) {
+    if !are_two_years(problem) {
         return false;
     }
     let Some(column) = columns.first() else {

@@ -16,8 +16,11 @@ use super::slow::SlowFit;
 const MOST_OF_AN_INSTRUMENT_MM: f64 = 5.0;
 /// So many margins of the BIC a response with a long memory may gain more than waves by bending.
 const BENT: f64 = 3.0;
-/// A covariate leads a slow load by so much of the margin. Of four drawn slopes that fail by a power law three led it by less, or not at all; a lake
-/// that is drawn down once leads it by nine tenths.
+/// A covariate with a memory of more than this share of the record, or that changes the log-load by less than this standard deviation, leads a slow load by so
+/// much of the margin: those of three drawn slopes that fail by a power law had memories of .30 and .39, or a load of .01, and led it by less; of five lakes
+/// that are drawn down once, with memories of at most .12, four did too.
+const SLOW_COURSE: f64 = 0.2;
+const HARDLY_ANYTHING: f64 = 0.05;
 const LEADS_A_SLOW_LOAD: f64 = 0.5;
 /// A load with this standard deviation hardly changes the velocity: by a tenth.
 const WEAK_LOAD: f64 = 0.1;
@@ -149,8 +152,12 @@ impl Search<'_> {
             return None;
         }
         let more = slow.gain - most;
-        // A covariate supports an effect by its course: where any slow course does nearly as well, it does not.
-        let asked = if one.term.kind.definition().support == Support::Covariate {
+        // A covariate supports an effect by its course: where that is slow, or does hardly anything, and any slow course does nearly as well, it
+        // does not.
+        let is_slow = self.is_slower_than(one, SLOW_COURSE);
+        let is_weak = one.load_sd().is_some_and(|sd| sd < HARDLY_ANYTHING);
+        let is_by_course = one.term.kind.definition().support == Support::Covariate;
+        let asked = if is_by_course && (is_slow || is_weak) {
             -LEADS_A_SLOW_LOAD
         } else {
             1.0
@@ -163,7 +170,9 @@ impl Search<'_> {
             );
             return None;
         }
-        if let Some(found) = self.event_after_all(base, &slow, one.p_value) {
+        if more >= self.options.bic_margin
+            && let Some(found) = self.event_after_all(base, &slow, one.p_value)
+        {
             return Some(found);
         }
         self.note_slow(

@@ -58,7 +58,7 @@ impl Search<'_> {
         // Where the noise remembers, the noise of the bank does too.
         let times = if is_by_shape && one.fitted.noise.memory != Memory::Reading {
             BY_SHAPE
-        } else if self.is_slow(one) {
+        } else if self.is_slower_than(one, SLOW) {
             BY_SLOW_RESPONSE
         } else {
             1.0
@@ -66,9 +66,9 @@ impl Search<'_> {
         times * self.options.bic_margin
     }
 
-    /// Whether a covariate acts over so long a time that what it does follows any slow bend.
-    fn is_slow(&self, one: &Refitted) -> bool {
+    /// Whether a covariate acts over so long a time, as a share of the record, that what it does follows any slow bend.
+    pub(super) fn is_slower_than(&self, one: &Refitted, share: f64) -> bool {
         let response = one.term.response;
-        response.is_some_and(|own| own.memory_days() > SLOW * self.problem.span())
+        response.is_some_and(|own| own.memory_days() > share * self.problem.span())
     }
 }

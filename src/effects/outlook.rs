@@ -35,7 +35,7 @@ pub(super) fn forecast_change(
         });
         after
             .zip(before.as_ref())
-            .map(|(after, before)| after.beside(before))
+            .map(|(after, before)| after.beside(before, false))
     };
     let both = |of: &dyn Fn(&Outlook) -> Option<f64>| Change {
         before: before.as_ref().and_then(of),

@@ -140,7 +140,7 @@ impl Refitted {
     /// What follows the year cannot be distinguished from the season.
     pub(super) fn with_season(&self, mut how: Accepted, problem: &Problem) -> Accepted {
         let season = Rival::from(Kind::SEASONAL);
-        let seen = candidates::shows_the_year(problem);
+        let seen = candidates::are_two_years(problem);
         if self.follows_season && seen && !how.ties.contains(&season) {
             how.ties.push(season);
         }

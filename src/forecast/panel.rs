@@ -240,9 +240,9 @@ pub(super) fn passages(
 
 impl Outlook {
     /// This forecast, which knows a load that was found, with `plain` beside it, which knows none. What was found may be wrong, and
-    /// then it is wrong with confidence: a quarter of the weight stays with the law that went without. As far as the slope accelerates by the load's
-    /// clock too, the load does not account for the motion, and no chance is under that of the law that went without.
-    pub(crate) fn beside(self, plain: &Self) -> Self {
+    /// then it is wrong with confidence: a quarter of the weight stays with the law that went without. Where the motion is not
+    /// `explained` by the load, no chance is under that of the law that went without, as far as the slope accelerates by the load's clock too.
+    pub(crate) fn beside(self, plain: &Self, is_explained: bool) -> Self {
         let mut regimes = BTreeMap::new();
         for (outlook, share) in [(&self, 1.0 - PLAIN_SHARE), (plain, PLAIN_SHARE)] {
             for (regime, chance) in &outlook.regimes {
@@ -251,7 +251,8 @@ impl Outlook {
         }
         let accelerating =
             (1.0 - PLAIN_SHARE) * self.accelerating + PLAIN_SHARE * plain.accelerating;
-        let unaccounted = Passage::default().pooled(&plain.chances, self.accelerating);
+        let unaccounted = if is_explained { 0.0 } else { self.accelerating };
+        let unaccounted = Passage::default().pooled(&plain.chances, unaccounted);
         let pooled =
             |own: &Passage, plain: &Passage| own.pooled(plain, PLAIN_SHARE).at_least(&unaccounted);
         Self {

@@ -208,15 +208,19 @@ impl Silence {
         Some(allowed.max(LEAST).max(between).max(apart))
     }
 
-    /// For how long it may be silent where it is read more seldom from now on: the two newest readings came after gaps of one length.
+    /// For how long it may be silent where it is read more seldom from now on: the two newest readings came after gaps of one length. No longer than
+    /// who has given a single reading: two outages may be as long as each other too.
     fn apart_now(&self) -> Option<SignedDuration> {
         let mut newest = self.gaps.iter().rev();
         let ((later, gap), (earlier, before)) = newest.next().zip(newest.next())?;
-        let is_one_after_the_other = earlier.checked_add(*before).ok()? == *later
-            && later.checked_add(*gap).ok() == self.counted_from();
+        let ends = |from: &Timestamp, gap: &SignedDuration| from.as_second() + gap.as_secs();
+        // Gaps are kept in whole seconds.
+        let is_at = |end: i64, time: Timestamp| (end - time.as_second()).abs() <= 1;
+        let is_one_after_the_other =
+            is_at(ends(earlier, before), *later) && is_at(ends(later, gap), self.counted_from()?);
         let lengths = [before.as_secs(), gap.as_secs()];
         (is_one_after_the_other && is_even(lengths.into_iter()))
-            .then(|| SignedDuration::from_secs(outlasted(gap.as_secs())))
+            .then(|| SignedDuration::from_secs(outlasted(gap.as_secs())).min(FIRST))
     }
 
     /// Ends the silence that there is; the reading before which it began.
@@ -328,6 +332,10 @@ mod tests {
         };
         let (found, allowed) = silences(&[24.0; 12]);
         assert!(found == 2 && allowed < 100.0, "{found} {allowed}");
+        // Times with fractions of a second are no other.
+        assert_eq!(silences(&[24.000_1; 12]).0, 2);
+        // Two outages of a month, and then silence: a rhythm of months is not waited for.
+        assert!(silences(&[720.0, 720.0]).1 <= 8.0 * 24.0);
         // A gap between others of the old kind says nothing, nor do two that are not alike.
         assert!(silences(&[24.0, 0.1, 0.1]).1 < 3.0);
         assert!(silences(&[24.0, 10.0]).1 < 10.0);

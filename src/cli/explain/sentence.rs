@@ -99,7 +99,8 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
         let rivals = Rival::listed(&explanation.cannot_separate_from);
         said.push(format!("Cannot be separated from: {rivals}."));
         let mut kinds = explanation.cannot_separate_from.iter();
-        if kinds.any(|rival| rival.kind == Kind::SEASONAL) {
+        let is_said = explanation.verdict.effect == Kind::SEASONAL_READING;
+        if !is_said && kinds.any(|rival| rival.kind == Kind::SEASONAL) {
             said.push(
                 "A wave of the year may lie in the readings themselves too, as in those of GNSS."
                     .to_owned(),

@@ -109,7 +109,7 @@ impl Adopted {
                 velocity < TOO_FAST * critical && velocity <= BEYOND_FASTEST * self.fastest
             });
         Some(UnderKnownLoad {
-            outlook: outlook.beside(plain),
+            outlook: outlook.beside(plain, is_explained),
             is_explained,
         })
     }
