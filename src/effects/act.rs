@@ -70,6 +70,14 @@ pub(super) fn harmonics(times: &[f64], periods: &[f64]) -> Vec<Vec<f64>> {
     columns
 }
 
+/// The amplitudes of waves with these coefficients of [`harmonics`].
+pub(super) fn amplitudes(coefficients: &[f64]) -> impl Iterator<Item = f64> {
+    coefficients.chunks(2).map(|pair| {
+        let sine = pair.get(1).copied().unwrap_or(0.0);
+        pair[0].hypot(sine) * std::f64::consts::SQRT_2
+    })
+}
+
 /// The same values with mean 0 and standard deviation 1; `None` where they do not change.
 pub(super) fn standardise(mut values: Vec<f64>) -> Option<Vec<f64>> {
     let n = values.len() as f64;

@@ -1,10 +1,10 @@
 //! Everything that may be missing, as terms to be tried.
 
-use super::act::{Act, harmonics};
+use super::act::{Act, harmonics, standardise};
 use super::definition::SearchedRecord;
 use super::frame::dot;
 use super::kind::{Form, Kind};
-use super::problem::Problem;
+use super::problem::{Problem, slips};
 use super::quantiles::upper_median;
 use super::response::{Driver, Response};
 use super::term::{MIDDLE, Term};
@@ -143,9 +143,12 @@ pub(super) fn follows_season(problem: &Problem, term: &Term) -> bool {
         return false;
     };
     // What a rate adds up to is the covariate itself.
-    let mut left = match term.response.map(|response| response.form) {
-        Some(Form::Rate) => added_up(&problem.nodes, column),
-        Some(Form::Level) | None => column.clone(),
+    let course = match term.response.map(|response| response.form) {
+        Some(Form::Rate) => standardise(slips(&problem.nodes, column)),
+        Some(Form::Level) | None => Some(column.clone()),
+    };
+    let Some(mut left) = course else {
+        return false;
     };
     let whole = dot(&left, &left);
     let mut directions: Vec<Vec<f64>> = Vec::new();
@@ -168,17 +171,6 @@ pub(super) fn follows_season(problem: &Problem, term: &Term) -> bool {
         directions.push(unit);
     }
     dot(&left, &left) < (1.0 - SEASONAL_SHARE) * whole
-}
-
-/// The integral of a column at these days, about its mean.
-fn added_up(days: &[f64], column: &[f64]) -> Vec<f64> {
-    let mut sum = vec![0.0; column.len()];
-    for i in 1..column.len() {
-        let mean = f64::midpoint(column[i - 1], column[i]);
-        sum[i] = sum[i - 1] + mean * (days[i] - days[i - 1]);
-    }
-    let mean = sum.iter().sum::<f64>() / sum.len().max(1) as f64;
-    sum.iter().map(|value| value - mean).collect()
 }
 
 /// What of that kind happened once, before reading `at`, in each way that it may.

@@ -209,9 +209,8 @@ impl Search<'_> {
     fn note_beside(&mut self, found: &OneMore, one: &Refitted) {
         if let OneMore::SlowLoad(_, gain) = found
             && one.gain > gain - self.options.bic_margin
-            && let Some(term) = one.fitted.terms.last()
         {
-            self.may_have_acted.push(named(term, self.drivers));
+            self.may_have_acted.push(named(&one.term, self.drivers));
         }
     }
 
@@ -222,11 +221,8 @@ impl Search<'_> {
             let weight = objection.as_ref().map(|objection| objection.weight);
             weight == Some(ObjectionWeight::MayHaveActed) && one.p_value < SIGNIFICANT
         });
-        if let Some((one, _)) = best
-            && let Some(term) = one.fitted.terms.last()
-        {
-            self.may_have_acted.push(named(term, self.drivers));
-        }
+        self.may_have_acted
+            .extend(best.map(|(one, _)| named(&one.term, self.drivers)));
     }
 
     /// The event that accounts for the readings as well as the slow load, where it may be accepted; it gains more than what had this
@@ -330,12 +326,12 @@ fn with_other_delays_beside(refitted: Vec<Refitted>) -> Vec<Refitted> {
 /// most instruments do so by a few millimetres, and a response with a long memory bends a little more than waves do. What
 /// follows the year so weakly is no rarer without any effect than the waves are. They go before any load that follows the year where they explain more.
 fn prefer_the_reading(refitted: &mut [Refitted], margin: f64) {
-    let are_waves = |one: &Refitted| {
+    let may_be_theirs = |one: &Refitted| {
         let definition = one.term.kind.definition();
-        definition.lies_in == LiesIn::Reading && !definition.wave_periods.is_empty()
+        let are_waves =
+            definition.lies_in == LiesIn::Reading && !definition.wave_periods.is_empty();
+        are_waves && one.wave_amplitude() <= MOST_OF_AN_INSTRUMENT_MM
     };
-    let may_be_theirs =
-        |one: &Refitted| are_waves(one) && one.wave_amplitude() <= MOST_OF_AN_INSTRUMENT_MM;
     let Some(place) = refitted.iter().position(may_be_theirs) else {
         return;
     };

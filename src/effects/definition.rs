@@ -1,6 +1,6 @@
 //! What an effect is, in one value: its name and its words, how a search tries it, what supports it, and how its size is reported.
 
-use super::act::{Act, harmonics, standardise};
+use super::act::{Act, amplitudes, harmonics, standardise};
 use crate::reading::{CovariateKind, Quantity, Timestamp, Unit};
 
 /// One year, days.
@@ -232,11 +232,9 @@ impl EffectSize {
 
     /// The strongest of waves of these periods, days: its amplitude, in log-load or in what the reading is measured in, and its period.
     pub fn of_waves(fitted: &FittedCoefficients, periods: &[f64]) -> Self {
-        let amplitudes = fitted.values.chunks(2).map(|pair| {
-            let sine = pair.get(1).copied().unwrap_or(0.0);
-            pair[0].hypot(sine) * std::f64::consts::SQRT_2
-        });
-        let strongest = amplitudes.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+        let strongest = amplitudes(fitted.values)
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(&b.1));
         Self {
             size: strongest.map(|(_, size)| size),
             period_days: strongest.and_then(|(k, _)| periods.get(k).copied()),

@@ -70,7 +70,7 @@ pub(super) fn most_extrapolated(kind: Kind) -> f64 {
 /// Why `fitted` (the last of its terms being new) is not what the physics allow; `None` if it is.
 pub(super) fn objection(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) -> Option<String> {
     let term = fitted.terms.last()?;
-    let own = &fitted.parameters[fitted.parameters.len() - term.coefficients()..];
+    let own = newest_coefficients(fitted);
     if let Some(response) = term.response
         && response.memory_days() > 0.5 * problem.span()
     {
@@ -469,6 +469,12 @@ pub(super) fn named(term: &Term, drivers: &[Driver]) -> Rival {
 /// Where the coefficients of the term of that index stand among the parameters.
 pub(super) fn coefficients<'a>(problem: &Problem, fitted: &'a Fitted, index: usize) -> &'a [f64] {
     &fitted.parameters[coefficients_of(problem, &fitted.terms, index)]
+}
+
+/// Those of the newest term; none where there is none.
+pub(super) fn newest_coefficients(fitted: &Fitted) -> &[f64] {
+    let count = fitted.terms.last().map_or(0, Term::coefficients);
+    &fitted.parameters[fitted.parameters.len() - count..]
 }
 
 #[cfg(test)]

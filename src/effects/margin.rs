@@ -26,7 +26,7 @@ impl Search<'_> {
             return Some(format!("the BIC falls by {gain:.1} only, {margin} is asked for").into());
         }
         let (problem, fitted, drivers) = (self.problem, &one.fitted, self.drivers);
-        let by_physics = objection(problem, fitted, drivers);
+        let by_physics = || objection(problem, fitted, drivers);
         let may_have_acted = |why| Objection {
             why,
             weight: ObjectionWeight::MayHaveActed,
@@ -35,13 +35,13 @@ impl Search<'_> {
             let share = 100.0 * one.p_value;
             let why = format!("without any effect a search gains as much in {share:.0} % of cases");
             let is_nearly = one.term.channel.is_some() && one.p_value < NEARLY_SIGNIFICANT;
-            return Some(if is_nearly && by_physics.is_none() {
+            return Some(if is_nearly && by_physics().is_none() {
                 may_have_acted(why)
             } else {
                 why.into()
             });
         }
-        by_physics.map(Objection::from).or_else(|| {
+        by_physics().map(Objection::from).or_else(|| {
             // Who declares an offset knows that it was the instrument.
             let is_open = self.declared == DeclaredPart::Nothing;
             let slip = is_open.then(|| may_be_slip(problem, fitted, drivers))?;

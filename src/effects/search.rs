@@ -1,13 +1,14 @@
 //! The search: one effect after another, each refitted with the law and judged, while any earns its place.
 
-use super::act::Act;
+use super::act::{Act, amplitudes};
 use super::candidates;
 use super::definition::Support;
 use super::explanation::Candidate;
 use super::fresh::best_of_starts;
 use super::inverted::inverted_starts;
 use super::judge::{
-    Compared, HeldOut, StepErrors, block, held_out, most_extrapolated, step_errors,
+    Compared, HeldOut, StepErrors, block, held_out, most_extrapolated, newest_coefficients,
+    step_errors,
 };
 use super::kind::Kind;
 use super::noise::Whitener;
@@ -157,21 +158,15 @@ impl Refitted {
     /// The standard deviation of its log-load; `None` where it is none.
     pub(super) fn load_sd(&self) -> Option<f64> {
         let is_load = matches!(self.term.act, Act::Load(_));
-        let squares = self.own().iter().map(|gain| gain * gain);
+        let squares = newest_coefficients(&self.fitted)
+            .iter()
+            .map(|gain| gain * gain);
         is_load.then(|| squares.sum::<f64>().sqrt())
     }
 
-    /// The amplitude of the largest of its waves, each of which has a cosine and a sine, times the root of two.
+    /// The amplitude of the largest of its waves.
     pub(super) fn wave_amplitude(&self) -> f64 {
-        let waves = self.own().chunks(2);
-        let sizes = waves.map(|wave| wave.iter().map(|one| 2.0 * one * one).sum::<f64>().sqrt());
-        sizes.fold(0.0, f64::max)
-    }
-
-    /// Its own coefficients.
-    fn own(&self) -> &[f64] {
-        let parameters = &self.fitted.parameters;
-        &parameters[parameters.len() - self.term.coefficients()..]
+        amplitudes(newest_coefficients(&self.fitted)).fold(0.0, f64::max)
     }
 
     /// Whether it is the same effect, with whatever delay.

@@ -1,50 +1,19 @@
 //! A covariate is what acted only where a slow load that nothing measures does not do nearly as well.
 
-use rand::{RngExt, SeedableRng};
-use rand_distr::StandardNormal;
+use crate::drawn::{channel, normal, read_daily, yearly};
+use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use slipwatch::effects::{Explanation, Kind, Options, explain};
-use slipwatch::reading::{
-    BenchmarkId, Channel, Reading, Sample, Series, Timestamp, Unit, after_days,
-};
-
-fn at(day: f64) -> Timestamp {
-    let epoch = "2021-01-01T06:00:00Z".parse().unwrap();
-    after_days(epoch, day).unwrap()
-}
-
-fn channel(name: &str, days: u32, value: impl FnMut(f64) -> f64) -> Channel {
-    let mut value = value;
-    let samples = (0..days).map(f64::from).map(|day| Sample {
-        time: at(day),
-        value: value(day),
-    });
-    Channel {
-        name: name.to_owned(),
-        unit: None,
-        stated: None,
-        samples: samples.collect(),
-    }
-}
+use slipwatch::reading::{Channel, Series};
 
 /// A slope of that velocity, mm/day, by the day, read each day with an error of `noise` mm.
 fn series(days: u32, velocity: impl Fn(f64) -> f64, noise: f64, generator: &mut Pcg64) -> Series {
     let mut moved = 0.0;
-    let readings = (0..days).map(f64::from).map(|day| {
+    read_daily(days, |day| {
         let parts = (0..24).map(|hour| velocity(day - 1.0 + (f64::from(hour) + 0.5) / 24.0));
         moved += parts.sum::<f64>() / 24.0;
-        Reading {
-            time: at(day),
-            value: moved + noise * generator.sample::<f64, _>(StandardNormal),
-            sigma: None,
-        }
-    });
-    Series {
-        benchmark: BenchmarkId::new("prism"),
-        unit: Unit::MM,
-        averaging: None,
-        readings: readings.collect(),
-    }
+        moved + noise * normal(generator)
+    })
 }
 
 fn said(series: &Series, channels: &[Channel]) -> Explanation {
@@ -56,11 +25,7 @@ fn warmth_does_not_explain_a_slope_that_fails_by_a_power_law() {
     let mut generator = Pcg64::seed_from_u64(5);
     let power = |day: f64| 0.4 * (1.0 - day / 215.0).powf(-1.6);
     let slope = series(200, power, 0.8, &mut generator);
-    let mut weather = 0.0;
-    let warmth = channel("air_temperature_c", 200, |day| {
-        weather = 0.8 * weather + 1.8 * generator.sample::<f64, _>(StandardNormal);
-        8.0 - 10.0 * (std::f64::consts::TAU * (day - 15.0) / 365.25).cos() + weather
-    });
+    let warmth = yearly("air_temperature_c", 200, 15.0, &mut generator);
     let explanation = said(&slope, &[warmth]);
     let mut effects = std::iter::once(&explanation.verdict).chain(&explanation.also);
     assert!(

@@ -1,62 +1,23 @@
 //! What comes and goes with the year in the readings is not said of the slope.
 
-use rand::{RngExt, SeedableRng};
-use rand_distr::StandardNormal;
+use crate::drawn::{YEAR, normal, read_daily, yearly};
+use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use slipwatch::effects::{Explanation, Kind, Options, explain};
-use slipwatch::reading::{
-    BenchmarkId, Channel, Reading, Sample, Series, Timestamp, Unit, after_days,
-};
 
 const DAYS: u32 = 1200;
-const YEAR: f64 = 365.25;
-
-fn at(day: u32) -> Timestamp {
-    let epoch = "2021-01-01T06:00:00Z".parse().unwrap();
-    after_days(epoch, f64::from(day)).unwrap()
-}
-
-/// A channel with a yearly course, whose days differ by a walk that is drawn back.
-fn yearly(name: &str, phase_days: f64, generator: &mut Pcg64) -> Channel {
-    let mut weather = 0.0;
-    let samples = (0..DAYS).map(|day| {
-        weather = 0.8 * weather + 1.8 * generator.sample::<f64, _>(StandardNormal);
-        let phase = std::f64::consts::TAU * (f64::from(day) - phase_days) / YEAR;
-        Sample {
-            time: at(day),
-            value: 8.0 - 10.0 * phase.cos() + weather,
-        }
-    });
-    Channel {
-        name: name.to_owned(),
-        unit: None,
-        stated: None,
-        samples: samples.collect(),
-    }
-}
 
 /// A steady slope of so many mm/day, read each day with an error of 1.5 mm and a yearly wave of `wave_mm`, beside the air's temperature and a lake that have
 /// nothing to do with it.
 fn read(mm_per_day: f64, wave_mm: f64, seed: u64) -> Explanation {
     let mut generator = Pcg64::seed_from_u64(seed);
-    let readings = (0..DAYS).map(|day| {
-        let noise: f64 = generator.sample(StandardNormal);
-        let phase = std::f64::consts::TAU * (f64::from(day) - 200.0) / YEAR;
-        Reading {
-            time: at(day),
-            value: mm_per_day * f64::from(day) + wave_mm * phase.cos() + 1.5 * noise,
-            sigma: None,
-        }
+    let series = read_daily(DAYS, |day| {
+        let phase = std::f64::consts::TAU * (day - 200.0) / YEAR;
+        mm_per_day * day + wave_mm * phase.cos() + 1.5 * normal(&mut generator)
     });
-    let series = Series {
-        benchmark: BenchmarkId::new("receiver"),
-        unit: Unit::MM,
-        averaging: None,
-        readings: readings.collect(),
-    };
     let channels = [
-        yearly("air_temperature_c", 15.0, &mut generator),
-        yearly("lake_level_m", 130.0, &mut generator),
+        yearly("air_temperature_c", DAYS, 15.0, &mut generator),
+        yearly("lake_level_m", DAYS, 130.0, &mut generator),
     ];
     let options = Options {
         surrogates: 99,

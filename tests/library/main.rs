@@ -7,6 +7,7 @@ mod covariates_or_slow_loads;
 mod crises;
 mod crisis;
 mod declared;
+mod drawn;
 mod earlier_events;
 mod effects_faults;
 mod effects_groups;
