@@ -182,6 +182,20 @@ impl Part {
         }
     }
 
+    /// By when 95 % of a covariate's response has passed, days; 0 of what has none.
+    pub fn memory_days(&self) -> f64 {
+        match self {
+            Self::Load { filtered, .. } | Self::Thermal { filtered, .. } => {
+                filtered.response().memory_days()
+            }
+            Self::Other { part, .. } => part.memory_days(),
+            Self::Harmonics { .. }
+            | Self::ReadingHarmonics { .. }
+            | Self::Step { .. }
+            | Self::Offset { .. } => 0.0,
+        }
+    }
+
     /// Whether the load steps by it.
     pub fn is_step(&self) -> bool {
         match self {
@@ -237,16 +251,19 @@ impl Filtered {
             .copied()
     }
 
+    fn response(&self) -> Response {
+        Response {
+            form: self.form,
+            stages: self.stages,
+            mean_days: self.mean_days,
+        }
+    }
+
     fn times(&self, gain: f64, channels: &[&Channel], times: &[Timestamp]) -> Option<Vec<f64>> {
         let epoch = *times.first()?;
         let driver = Driver::new(0, self.channel(channels)?, epoch)?;
         let days: Vec<f64> = times.iter().map(|time| days_since(epoch, *time)).collect();
-        let response = Response {
-            form: self.form,
-            stages: self.stages,
-            mean_days: self.mean_days,
-        };
-        let values = driver.respond_in_unit(response, &days).into_iter();
+        let values = driver.respond_in_unit(self.response(), &days).into_iter();
         let scaled = values.map(|value| gain * (value - self.mean) / self.deviation);
         Some(scaled.collect())
     }

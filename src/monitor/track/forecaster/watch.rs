@@ -22,6 +22,10 @@ const STRUCTURE: f64 = 20.0;
 /// A load of less than this, e-folds of velocity, is worth a search but nobody's attention: a third more or less
 /// of a slope's velocity is what slopes do.
 const WORTH_REPORTING: f64 = 0.3;
+/// A response that takes more than this share of the record to pass was seen but once or twice, and follows any slow bend: it is
+/// reported, and no forecast goes by it. On NTOE (Salmon Falls Creek) one of half the record put the chance of a collapse within 400
+/// days at .73, without the effect .01; the slope stands.
+const LONGEST_MEMORY: f64 = 1.0 / 3.0;
 /// Two finds of one event lie no further apart than this share of the record.
 const SAME_TIME: f64 = 0.05;
 
@@ -295,11 +299,13 @@ fn effect_found(effect: &Effect, finding: &SearchFinding, adopted: bool) -> Even
 /// The effects that something besides the motion supports: a covariate, the calendar, the instrument. A
 /// step of the load that only the motion shows may as well be the failure's own beginning. Where the readings do not distinguish
 /// the effects from others, an offset of the instrument by which forecasts go already, `before`, stays: whatever moves the slope
-/// since says nothing of a jump that lies behind. `length_days`: of the record.
+/// since says nothing of a jump that lies behind. A response as long as a third of the record is none of them. `length_days`: of the
+/// record.
 fn adoptable(finding: &SearchFinding, before: Option<&KnownLoad>, length_days: f64) -> KnownLoad {
     let is_separable = is_separable(finding);
     let stays = |part: &&Part| {
         !part.is_step()
+            && part.memory_days() <= LONGEST_MEMORY * length_days
             && (is_separable || before.is_some_and(|law| has_offset(law, part, length_days)))
     };
     let parts = finding.known_load.parts.iter();
@@ -331,7 +337,7 @@ fn is_separable(finding: &SearchFinding) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::Explained;
+    use crate::effects::{Explained, Filtered, Form};
     use crate::reading::{BenchmarkId, after_days};
 
     #[test]
@@ -372,6 +378,33 @@ mod tests {
         assert!(adopted(&finding, None).is_empty());
         finding.cannot_separate_from.clear();
         assert_eq!(adopted(&finding, None).len(), 2);
+    }
+
+    #[test]
+    fn a_response_that_takes_half_the_record_is_not_adopted() {
+        let by = |mean_days: f64| Part::Load {
+            filtered: Filtered {
+                channel: "lake_level_m".to_owned(),
+                form: Form::Level,
+                stages: 1,
+                mean_days,
+                mean: 0.0,
+                deviation: 1.0,
+            },
+            gain: 0.5,
+        };
+        let finding = |mean_days: f64| SearchFinding {
+            benchmark: BenchmarkId::new("a"),
+            effects: vec![Effect::of(Kind::HYDROLOGICAL)],
+            explained: Explained::Full,
+            cannot_separate_from: Vec::new(),
+            known_load: KnownLoad {
+                parts: vec![by(mean_days)],
+            },
+            undeclared_load: None,
+        };
+        let adopted = |mean_days| adoptable(&finding(mean_days), None, 360.0).parts.len();
+        assert_eq!([20.0, 60.0].map(adopted), [1, 0]);
     }
 
     #[test]
