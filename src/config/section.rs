@@ -305,7 +305,7 @@ fn position(section: &mut Section<'_>) -> Option<Vec<f64>> {
     None
 }
 
-/// The unit that the column's name ends in.
+/// The unit that the column's name ends in, after its quantity or in brackets.
 fn column_unit(section: &Section<'_>, column: &Placed<String>) -> Option<Unit> {
     let plain = column.value.to_ascii_lowercase();
     let unit = ["displacement_", "velocity_"].iter().find_map(|keyword| {
@@ -313,6 +313,7 @@ fn column_unit(section: &Section<'_>, column: &Placed<String>) -> Option<Unit> {
         let unit = Unit::parse(unit).ok()?;
         keyword.starts_with(unit.quantity().name()).then_some(unit)
     });
+    let unit = unit.or_else(|| Unit::in_brackets_of(&column.value));
     if unit.is_none() && !section.has("unit") {
         section.error(
             &column.at,
@@ -320,7 +321,7 @@ fn column_unit(section: &Section<'_>, column: &Placed<String>) -> Option<Unit> {
                 "benchmark.column = {:?} does not say its unit",
                 column.value
             ),
-            "add unit = \"mm\" or unit = \"mm_per_day\"",
+            "add unit = with the one that the column is in, such as \"mm\", \"m\" or \"mm_per_day\"",
         );
     }
     unit

@@ -55,13 +55,15 @@ pub(super) fn vector(section: &mut Section<'_>, unit: Option<Unit>) -> Option<Ve
         .into_iter()
         .map(|name| name.value)
         .collect();
-    let mut units = names.iter().map(|name| unit.or_else(|| unit_of(name)));
+    let mut units = names
+        .iter()
+        .map(|name| unit.or_else(|| Unit::at_end_of(name)));
     let first = units.next().flatten();
     let Some(unit) = first.filter(|_| units.all(|unit| unit == first)) else {
         section.error(
             &components.at,
             "benchmark.components do not all say one unit".to_owned(),
-            "add unit = \"mm\", or name columns that end in one and the same unit",
+            "add unit = with the one that they are in, such as \"mm\" or \"m\", or name columns that end in one and the same unit",
         );
         return None;
     };
@@ -70,10 +72,4 @@ pub(super) fn vector(section: &mut Section<'_>, unit: Option<Unit>) -> Option<Ve
         direction: direction.value.iter().map(|part| part / length).collect(),
         unit,
     })
-}
-
-/// The longest unit at a name's end.
-fn unit_of(name: &str) -> Option<Unit> {
-    let mut places = name.match_indices('_');
-    places.find_map(|(at, _)| Unit::parse(&name[at + 1..]).ok())
 }

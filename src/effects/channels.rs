@@ -1,9 +1,10 @@
 //! Which covariates count as evidence: each once, and only those that cover the record.
 
 use super::calendar::{is_of_the_calendar, on_one_line};
+use super::kind::Form;
 use super::problem::Problem;
-use super::response::Driver;
-use crate::reading::{Channel, after_days, counted};
+use super::response::{Driver, Response};
+use crate::reading::{Channel, CovariateKind, Unit, after_days, counted};
 
 /// A covariate must cover this share of the record.
 const LEAST_COVERAGE: f64 = 0.8;
@@ -11,6 +12,9 @@ const LEAST_COVERAGE: f64 = 0.8;
 const NAMED_GAPS: usize = 3;
 /// Two channels are one where what a straight line leaves of the one by the other is less than this share of its variance.
 const SAME: f64 = 1e-4;
+/// A channel of which nothing says what it measures moves as the readings do where a straight line leaves less than this share of its
+/// variance: another point of the slope, or another component of this one. Of a correlation of .98 on.
+const MOVES_ALIKE: f64 = 0.04;
 
 /// A channel that counts for nothing, because another holds its values.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -97,10 +101,40 @@ pub(super) fn drivers(
             ));
             continue;
         }
+        if moves_as_the_readings_do(problem, channel, &driver) {
+            remarks.push(format!(
+                "{0} was left out: it moves as the readings do, as another point or another component of the slope does, and would explain \
+                 motion by motion. If it is a cause, say what it measures: --covariate {0:?}=level, or [[covariate]] in the config.",
+                channel.name
+            ));
+            continue;
+        }
         remarks.extend(of_gaps(problem, &driver));
         drivers.push(driver);
     }
     drivers
+}
+
+/// Whether a channel of unknown kind, in a unit of motion or in none that is known, moves as the readings do: a length as displacements do,
+/// a velocity as velocities do.
+fn moves_as_the_readings_do(problem: &Problem, channel: &Channel, driver: &Driver) -> bool {
+    let unit = channel.unit.as_deref().map(Unit::parse);
+    let is_like = match unit {
+        None => true,
+        Some(Ok(unit)) => unit.quantity() == problem.quantity,
+        Some(Err(_)) => false,
+    };
+    if channel.stated.is_some() || channel.kind() != CovariateKind::Other || !is_like {
+        return false;
+    }
+    let at_once = Response {
+        form: Form::Level,
+        stages: 1,
+        mean_days: 0.0,
+    };
+    let values = driver.respond_in_unit(at_once, &problem.t);
+    let pairs: Vec<(f64, f64)> = values.into_iter().zip(problem.y.iter().copied()).collect();
+    on_one_line(&pairs, MOVES_ALIKE)
 }
 
 /// What is said of a covariate's gaps within the record.
@@ -131,6 +165,7 @@ mod tests {
     use super::super::options::Options;
     use super::super::problem::Problem;
     use super::drivers;
+    use crate::reading::{Channel, CovariateKind};
 
     #[test]
     fn a_channel_that_holds_the_values_of_another_is_named_with_it() {
@@ -153,6 +188,31 @@ mod tests {
             let is_named = said.remarks.iter().any(|one| one.starts_with(&named));
             assert!(is_named, "{copy}: {:?}", said.remarks);
         }
+    }
+
+    #[test]
+    fn another_point_of_the_slope_is_no_covariate_unless_somebody_says_so() {
+        let (series, mut channels) = driven_by_the_lake();
+        let days = daily(series.readings.len());
+        let moved = series.readings.iter().enumerate();
+        let moved = moved.map(|(i, one)| 310.0 + 1e-3 * (0.7 * one.value + (i % 3) as f64));
+        channels.push(channel("P2 [m]", &days, &moved.collect::<Vec<f64>>()));
+        let place = channels.len() - 1;
+        channels[place].unit = Some("m".to_owned());
+        let problem = Problem::new(&series, &channels).unwrap();
+        let mut remarks = Vec::new();
+        let known = |channels: &[Channel], remarks: &mut Vec<String>| {
+            let all = drivers(&problem, channels, remarks).into_iter();
+            all.map(|one| one.name).collect::<Vec<String>>()
+        };
+        let names = known(&channels, &mut remarks);
+        assert!(names.iter().all(|name| name != "P2 [m]") && names.len() == place);
+        assert!(
+            remarks[0].starts_with("P2 [m] was left out: it moves as the readings do"),
+            "{remarks:?}"
+        );
+        channels[place].stated = Some(CovariateKind::Level);
+        assert_eq!(known(&channels, &mut remarks).len(), place + 1);
     }
 
     #[test]

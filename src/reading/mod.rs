@@ -25,7 +25,7 @@ pub use recording::{MergeError, Recording, SelectError};
 pub use running_total::RunningTotal;
 pub use series::{Channel, Disorder, Reading, Sample, Series};
 pub use suspicion::Suspicion;
-pub use unit::{LengthUnit, Quantity, TimeUnit, Unit, UnitError};
+pub use unit::{LengthUnit, Quantity, TimeUnit, Unit, UnitError, bracketed, in_brackets};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -203,6 +203,18 @@ impl Unit {
         }
     }
 
+    /// The unit in brackets at the end of a column's name: m of `P1 East [m]`.
+    pub fn in_brackets_of(name: &str) -> Option<Self> {
+        Self::parse(bracketed(name)?).ok()
+    }
+
+    /// The longest unit at the end of a component's name, or that in brackets there: mm of `east_mm`.
+    pub fn at_end_of(name: &str) -> Option<Self> {
+        let mut places = name.match_indices('_');
+        let at_end = places.find_map(|(at, _)| Self::parse(&name[at + 1..]).ok());
+        at_end.or_else(|| Self::in_brackets_of(name))
+    }
+
     /// Parses `mm`, `mm_per_day`, `mm/d`, `m per day`, `cm/yr`.
     ///
     /// # Errors
@@ -226,6 +238,18 @@ impl Unit {
                 .ok_or_else(fail),
         }
     }
+}
+
+/// What stands in brackets, of a text that is nothing else: `mm/d` of ` [mm/d]` or `(mm/d)`.
+pub fn in_brackets(rest: &str) -> Option<&str> {
+    let rest = rest.trim();
+    let inner = |open, close| rest.strip_prefix(open)?.strip_suffix(close);
+    inner('[', ']').or_else(|| inner('(', ')')).map(str::trim)
+}
+
+/// What stands in brackets at the end of a name: `mm/h` of `E [mm/h]`.
+pub fn bracketed(name: &str) -> Option<&str> {
+    in_brackets(&name[name.rfind(['[', '('])?..])
 }
 
 fn split_rate(text: &str) -> (&str, Option<&str>) {

@@ -362,8 +362,14 @@ fn a_column_that_does_not_say_its_unit_needs_one() {
     assert_eq!(
         problem("[[benchmark]]\nid = \"5\"\ncolumn = \"ext_1\"\n"),
         "site.toml:12:10: error: benchmark.column = \"ext_1\" does not say its unit; \
-         add unit = \"mm\" or unit = \"mm_per_day\""
+         add unit = with the one that the column is in, such as \"mm\", \"m\" or \"mm_per_day\""
     );
+    let in_brackets = "[[benchmark]]\nid = \"5\"\ncolumn = \"P1 East [m]\"\n";
+    let text = format!("{RIGHT}{in_brackets}");
+    let config = config::parse(&text, Path::new("site.toml")).unwrap();
+    let metres = slipwatch::reading::Unit::parse("m").unwrap();
+    let own = config.benchmarks.iter().find(|one| one.id.as_str() == "5");
+    assert_eq!(own.unwrap().unit, Some(metres));
     let unit = "[[benchmark]]\nid = \"5\"\ncolumn = \"ext_1\"\nunit = \"mm_per_h\"\n";
     assert!(config::parse(&format!("{RIGHT}{unit}"), Path::new("site.toml")).is_ok());
 }

@@ -1,8 +1,7 @@
 //! What the times of a table, and the names of their columns, say of the logger's clock.
 
 use crate::config::value;
-use crate::reading::Timestamp;
-use crate::runtime::ingest::bracketed;
+use crate::reading::{Timestamp, bracketed};
 use jiff::tz::TimeZone;
 
 /// Fewer times show nothing.

@@ -1,7 +1,7 @@
 //! What is said of a file without readings.
 
-use crate::reading::Unit;
-use crate::runtime::ingest::{FileSurvey, Meaning, bracketed, unit_in_name};
+use crate::reading::{Unit, bracketed};
+use crate::runtime::ingest::{FileSurvey, Meaning, unit_in_name};
 use std::path::Path;
 
 /// Which flag names the readings of a file where no column does; where one does, what is wrong with its rows.

@@ -1,9 +1,9 @@
 //! What the columns of a CSV file mean, by their names alone.
 
 use super::column_map::Measure;
-use super::names::{Name, channel_unit, in_brackets, is_unit_of_motion, name_of};
+use super::names::{Name, channel_unit, is_unit_of_motion, name_of};
 use super::{IngestError, ReadOptions, Remark};
-use crate::reading::{BenchmarkId, Dialect, Unit};
+use crate::reading::{BenchmarkId, Dialect, Unit, in_brackets};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::Path;

@@ -41,7 +41,7 @@ pub(super) use mcap_write::write_mcap_by;
 pub use mcap_write::{encode_mcap, write_mcap};
 pub(super) use message::escape;
 pub use message::{MessageError, decode_message};
-pub use names::{bracketed, unit_in_name};
+pub use names::unit_in_name;
 pub use ndjson::NDJSON;
 pub use ndjson_write::write_ndjson;
 pub use survey::{Survey, survey};

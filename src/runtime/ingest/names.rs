@@ -1,7 +1,7 @@
 //! What the name of a column says: whose readings it holds, or the unit of a covariate.
 
 use super::column_map::Measure;
-use crate::reading::Unit;
+use crate::reading::{Unit, in_brackets};
 
 /// What a column's name says.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -61,18 +61,6 @@ fn measure_at(plain: &str, at: usize, keyword: &str) -> Option<Measure> {
         _ if unit.quantity().name() == keyword => Some(Measure::Reading(unit)),
         _ => None,
     }
-}
-
-/// `mm/d` of ` [mm/d]` or `(mm/d)`.
-pub(super) fn in_brackets(rest: &str) -> Option<&str> {
-    let rest = rest.trim();
-    let inner = |open, close| rest.strip_prefix(open)?.strip_suffix(close);
-    inner('[', ']').or_else(|| inner('(', ')')).map(str::trim)
-}
-
-/// What stands in brackets at the end of a name: `mm/h` of `E [mm/h]`.
-pub fn bracketed(name: &str) -> Option<&str> {
-    in_brackets(&name[name.rfind(['[', '('])?..])
 }
 
 /// Words of units of length and of velocity.

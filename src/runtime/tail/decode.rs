@@ -225,13 +225,19 @@ impl Decoder {
 
     /// Columns whose name says another unit than the config.
     pub(in crate::runtime) fn doubtful_units(&self) -> impl Iterator<Item = String> {
-        self.wanted.iter().filter_map(|benchmark| {
-            let (column, unit) = (benchmark.column.as_ref()?, benchmark.unit?);
-            let named = unit_in_name(column).filter(|named| *named != unit)?;
-            Some(format!(
-                "column {column:?} is named as one in {named}, and [[benchmark]] {:?} takes it in {unit}: is its unit right?",
-                benchmark.id.as_str()
-            ))
+        self.wanted.iter().flat_map(|benchmark| {
+            let of_column = |name: &str| unit_in_name(name).or_else(|| Unit::in_brackets_of(name));
+            let column = benchmark.column.iter().map(move |one| (one, of_column(one)));
+            let components = benchmark.vector.iter().flat_map(|one| &one.components);
+            let components = components.map(|one| (one, Unit::at_end_of(one)));
+            column.chain(components).filter_map(|(column, named)| {
+                let unit = benchmark.unit?;
+                let named = named.filter(|named| *named != unit)?;
+                Some(format!(
+                    "column {column:?} is named as one in {named}, and [[benchmark]] {:?} takes it in {unit}: is its unit right?",
+                    benchmark.id.as_str()
+                ))
+            })
         })
     }
 
