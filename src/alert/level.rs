@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// How grave an alert is.
+/// How grave an alert is. A threshold or a rule of the site may call yellow, orange and red too.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, JsonSchema, Serialize, Deserialize,
 )]
@@ -12,13 +12,17 @@ use std::fmt;
 pub enum Level {
     /// Nothing to report.
     Green,
-    /// Something has changed: look.
+    /// Look closer: the chance of collapse within the outlook is `yellow_chance` or more, the regime turned unstable, a predicted time comes
+    /// nearer, or the readings do not follow the law or move upslope.
     Yellow,
-    /// Failure is more likely than not within the outlook.
+    /// Prepare: the chance of collapse within the outlook is `orange_chance` or more, or red is pending: its chance is reached at the newest
+    /// reading and not yet in the mean.
     Orange,
-    /// Failure before an evacuation would have ended is too likely.
+    /// Evacuate: the chance of collapse within `red_within` of the next reading is `red_chance` or more, and its mean is high too, or it is far
+    /// more at one reading, or red was in force of late. Or the settled velocity is the critical velocity or more.
     Red,
-    /// The monitor cannot decide: no data, a sensor fault, a stale model.
+    /// Nothing can be said: no readings, a stuck sensor, readings that cannot be true or hardly mean what was intended, another quantity than
+    /// the one that is monitored, or a wrong clock. It stands beside the level in force.
     Unknown,
 }
 

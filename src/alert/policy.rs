@@ -31,11 +31,12 @@ pub struct Policy {
     pub red_within: Option<SignedDuration>,
     /// Passing this velocity is failure, mm/day.
     pub critical_velocity_mm_per_day: f64,
-    /// Chance of failure within [`Policy::red_within`] that calls red.
+    /// Chance of collapse within [`Policy::red_within`] of the next reading that calls red, where its mean is [`Policy::red_mean_chance`] or more, or
+    /// the chance itself [`Policy::red_at_once`] or more, or where red was in force within [`Policy::red_of_late`].
     pub red_chance: f64,
-    /// Chance of failure within the outlook that calls orange.
+    /// Chance of collapse within the outlook that calls orange.
     pub orange_chance: f64,
-    /// Chance of failure within the outlook that calls yellow.
+    /// Chance of collapse within the outlook that calls yellow.
     pub yellow_chance: f64,
     /// Plain thresholds beside the model.
     pub thresholds: Vec<Threshold>,

@@ -16,7 +16,7 @@ use std::process::ExitCode;
 
 /// The job found trouble.
 const TROUBLE: u8 = 1;
-/// The command line cannot be meant.
+/// The command line is invalid.
 const USAGE: u8 = 2;
 /// The data are bad.
 const DATA: u8 = 65;
@@ -32,7 +32,7 @@ const CONFIG: u8 = 78;
 #[error("so it is for user {0}")]
 pub(super) struct AsUser(pub(super) String, pub(super) Option<u8>);
 
-/// A command line that parses and cannot be meant.
+/// A command line that parses and is invalid.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(super) struct UsageError(pub(super) String);

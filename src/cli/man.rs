@@ -37,7 +37,7 @@ const CONFIG_END: &str = "\
 const EXIT_STATUS: [(&str, &str); 7] = [
     ("0", "done"),
     ("1", "the job found trouble"),
-    ("2", "the command line cannot be meant"),
+    ("2", "invalid command line"),
     ("65", "the data are bad"),
     ("69", "a service is missing"),
     ("74", "input or output failed"),

@@ -106,6 +106,10 @@ fn law(args: &Args) -> anyhow::Result<Law> {
             return Err(UsageError(problem).into());
         }
         (Some(s_theta), ..) => Law::at_unit_m(s_theta, args.t_unit_days, args.scale)?,
+        (None, Some(m), _) if (m - 1.0).abs() < f64::EPSILON => {
+            let problem = "--m: found 1, expected another number, or --s-theta in place of --x-i";
+            return Err(UsageError(problem.to_owned()).into());
+        }
         (None, Some(m), Some(x_i)) => Law::from_paper(m, x_i, args.t_unit_days, args.scale)?,
         (None, ..) => {
             let problem = "expected --m and --x-i, or --s-theta";

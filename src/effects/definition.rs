@@ -125,11 +125,11 @@ pub struct FittedCoefficients<'a> {
 /// The size of an effect as it is reported; the fields of [`Effect`](super::Effect) of the same names.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct EffectSize {
-    /// How large.
+    /// How large, in `unit`. Without a unit that of a load is the log-load, e-folds, and that of a reset is the factor of the state.
     pub size: Option<f64>,
-    /// The unit of it; `None` for a pure number.
+    /// The unit of the size, and of the gain of what acts in the reading; `None` for a pure number.
     pub unit: Option<String>,
-    /// For one standard deviation of what enters.
+    /// Gain for one standard deviation of what enters: of a load the log-load, e-folds; of what acts in the reading in `unit`.
     pub gain_per_sd: Option<f64>,
     /// The strongest period, days.
     pub period_days: Option<f64>,

@@ -75,11 +75,11 @@ pub struct Effect {
     pub lag_days: Option<f64>,
     /// By when 95 % of the response has passed (t95), days.
     pub memory_days: Option<f64>,
-    /// Log-load for one standard deviation of what enters.
+    /// Gain for one standard deviation of what enters: of a load the log-load, e-folds; of what acts in the reading in `unit`.
     pub gain_per_sd: Option<f64>,
     /// By which factor the velocity is higher where what enters is one standard deviation higher: the law's state answers to the load too.
     pub velocity_factor_per_sd: Option<f64>,
-    /// 5 and 95 % of the gain.
+    /// Bounds of the 90 % interval (5 and 95 %) of `gain_per_sd`, in its unit; null where the readings leave it open.
     pub gain_interval: Option<[f64; 2]>,
     /// The strongest period, days.
     pub period_days: Option<f64>,
@@ -89,7 +89,7 @@ pub struct Effect {
     pub at_interval: Option<[Timestamp; 2]>,
     /// How large: of an offset in `unit`, of a step the log-load, of a reset the state's factor, and so on.
     pub size: Option<f64>,
-    /// The unit of `size`; null for a pure number.
+    /// The unit of `size`, and of `gain_per_sd` of what acts in the reading; null for a pure number.
     pub unit: Option<String>,
     /// The groups into which the benchmarks parted.
     pub groups: Option<Vec<Vec<BenchmarkId>>>,
@@ -131,7 +131,8 @@ pub struct DeclaredEffect {
     pub declared: String,
     /// As it was fitted; null where it cannot be put into the law of this record.
     pub effect: Option<Effect>,
-    /// Held-out error with it over that of the law with all others that were declared; null where that is not asked of it.
+    /// Ratio of the root mean square errors over the held-out readings: with it, over that of the law with all others that were declared. Below 1 it
+    /// predicts them better. Null where that is not asked of it.
     pub held_out: Option<f64>,
     /// Why it does not stand; null where it does.
     pub rejected_because: Option<String>,
@@ -240,7 +241,8 @@ pub struct Candidate {
     pub bic_gain: f64,
     /// As in [`Effect`]; null where it was not reached.
     pub p_value: Option<f64>,
-    /// Held-out error with it over that without.
+    /// Ratio of the root mean square errors over the held-out readings: with it over that without. Below 1 it predicts them better. Null where it was
+    /// not reached or says nothing.
     pub held_out: Option<f64>,
     /// Why not; null for what was accepted.
     pub rejected_because: Option<String>,
@@ -268,9 +270,9 @@ pub struct Structure {
     pub from: Timestamp,
     /// To when.
     pub until: Timestamp,
-    /// Its most extreme log-load there.
+    /// Its most extreme log-load there, e-folds: ln of the factor by which it multiplies the velocity.
     pub log_load: f64,
-    /// The same in standard errors.
+    /// The same in standard errors of it.
     pub z: f64,
 }
 

@@ -31,8 +31,6 @@ const NOT_IN_FULL: f64 = 0.005;
 /// A white noise of so many times what the readings' digits leave open is noise that they show.
 const CLEAR_OF_DIGITS: f64 = 1.5;
 
-/// Extrapolated over the later block, a law that is off by more than so many times the range of the readings has failed before.
-const FAILED: f64 = 100.0;
 const FAILS: &str = "The law fails within the held-out readings: an error larger than all that the readings range over is no figure, and is not given.";
 
 /// Most stretches of structure that are reported.
@@ -198,7 +196,7 @@ fn errors(
 ) -> ErrorChange {
     let factor = unit.factor();
     let n = problem.t.len();
-    let is_a_figure = |error: &f64| *error <= FAILED * problem.range();
+    let is_a_figure = |error: &f64| StepErrors::is_a_figure(problem, *error);
     let extrapolated = held.map(|held| held.errors(problem));
     let shown = |error: Option<f64>| error.filter(is_a_figure).map(|error| error / factor);
     let held_out = Change {

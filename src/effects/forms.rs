@@ -23,7 +23,7 @@ fn is_other_form(effect: &Effect, one: &Candidate, margin: f64) -> bool {
         && effect.effect == one.effect
         && effect.form != one.form
         && one.held_out.is_some()
-        && one.bic_gain > effect.bic_gain - margin
+        && (one.bic_gain - effect.bic_gain).abs() < margin
         && one.p_value.is_some_and(|p| p < SIGNIFICANT)
 }
 

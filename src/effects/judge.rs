@@ -45,7 +45,7 @@ const MOST_EXTRAPOLATED: f64 = 1.2;
 const MOST_OF_A_TIDE: f64 = 10.0;
 
 /// Names of what only ever loosens a slope: more of it, more motion.
-const LOOSENING: [&str; 9] = [
+const LOOSENING: [&str; 10] = [
     "rain",
     "precip",
     "flow",
@@ -55,6 +55,7 @@ const LOOSENING: [&str; 9] = [
     "groundwater",
     "melt",
     "snowmelt",
+    "moisture",
 ];
 
 /// By what factor the held-out error may grow where it is extrapolated over all of the block; what only the shape of the readings

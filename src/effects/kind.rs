@@ -45,7 +45,7 @@ impl Kind {
     pub const THERMAL: Self = Self(&known::THERMAL);
     /// Velocity readings are means over an interval.
     pub const INTERVAL_MEAN: Self = Self(&known::INTERVAL_MEAN);
-    /// Noise of the reading that remembers.
+    /// Time-correlated noise of the readings.
     pub const CORRELATED_NOISE: Self = Self(&known::CORRELATED_NOISE);
     /// Structure is there, and nothing known explains it.
     pub const UNEXPLAINED: Self = Self(&known::UNEXPLAINED);

@@ -22,8 +22,13 @@ impl Search<'_> {
     pub(super) fn refused_at_once(&self, one: &Refitted) -> Option<Objection> {
         let margin = self.margin(one);
         if one.gain < margin {
-            let gain = one.gain;
-            return Some(format!("the BIC falls by {gain:.1} only, {margin} is asked for").into());
+            let (moves, by) = if one.gain < 0.0 {
+                ("rises", -one.gain)
+            } else {
+                ("falls", one.gain)
+            };
+            let why = format!("the BIC {moves} by {by:.1}; a fall of {margin} is required");
+            return Some(why.into());
         }
         let (problem, fitted, drivers) = (self.problem, &one.fitted, self.drivers);
         let by_physics = || objection(problem, fitted, drivers);

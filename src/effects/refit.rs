@@ -108,10 +108,11 @@ impl Start {
     }
 }
 
-/// Starts of the law alone: steady, accelerating, relaxing from above and from below, soon there, and there within the first readings.
+/// Starts of the law alone: steady, steady and answering to a load at once, accelerating, relaxing from above and from below, soon there, and there within the first readings.
 pub(super) fn plain_starts(problem: &Problem) -> Vec<Start> {
     let shapes = [
         (0.0, -2.0, 0.0),
+        (0.0, -6.0, 0.0),
         (0.8, -1.0, 0.3),
         (0.95, -3.0, 0.0),
         (-3.0, 1.0, -0.5),

@@ -102,9 +102,10 @@ impl Driver {
     }
 
     /// The gap in its values, as its first day and its last, from which its values of that day are not known: within the gap, or within
-    /// `memory` days of its end.
+    /// `memory` days of its end. Before the first value there is one.
     pub(super) fn gap_at(&self, day: f64, memory: f64) -> Option<(f64, f64)> {
-        let mut all = self.gaps.iter().copied();
+        let before = (f64::NEG_INFINITY, self.start);
+        let mut all = std::iter::once(before).chain(self.gaps.iter().copied());
         all.find(|(from, until)| (*from..=until + memory).contains(&day))
     }
 
@@ -202,20 +203,36 @@ impl Driver {
         let mut level = self.values.clone();
         // What one stage gives is linear between its values, whatever it was given.
         let mut is_total = self.is_total;
+        let mut settled = self.settled();
         for _ in 0..response.stages {
             if response.form == Form::Rate && response.mean_days < 0.5 * self.step {
                 break;
             }
             let mean = response.mean_days / f64::from(response.stages);
             if mean >= SHORTEST * self.step {
-                filter(&mut level, self.step, mean, is_total);
+                filter(&mut level, self.step, (mean, settled), is_total);
                 is_total = false;
+                settled = level[0];
             }
         }
         if response.form == Form::Rate {
             level = self.rate(&level, response);
         }
         self.read(&level, nodes, is_total)
+    }
+
+    /// To what a response has settled before the first value: of what comes and goes its mean, else that value.
+    fn settled(&self) -> f64 {
+        match self.kind {
+            CovariateKind::Rain | CovariateKind::Flow => {
+                self.values.iter().sum::<f64>() / self.values.len() as f64
+            }
+            CovariateKind::Level
+            | CovariateKind::Temperature
+            | CovariateKind::Humidity
+            | CovariateKind::Pressure
+            | CovariateKind::Other => self.values[0],
+        }
     }
 
     /// d/dt of the response: by the exponential's own equation, or from one value to the next.
@@ -349,9 +366,9 @@ fn on_a_grid(samples: &[(f64, f64)], step: f64, count: f64) -> Vec<f64> {
     values
 }
 
-/// The exponential response of mean `mean` to values `step` apart; settled at the first. Between the values the input is linear; where they
-/// are totals it is the later one throughout.
-fn filter(values: &mut [f64], step: f64, mean: f64, are_totals: bool) {
+/// The exponential response of mean `mean` to values `step` apart, `settled` before the first. Between the values the input is linear; where
+/// they are totals it is the later one throughout.
+fn filter(values: &mut [f64], step: f64, (mean, settled): (f64, f64), are_totals: bool) {
     let ratio = step / mean;
     let decay = (-ratio).exp();
     // Of a linear input: the mean of the step's start and end under the exponential.
@@ -361,7 +378,7 @@ fn filter(values: &mut [f64], step: f64, mean: f64, are_totals: bool) {
         1.0 - (1.0 - decay) / ratio
     };
     let early = 1.0 - decay - late;
-    let mut state = values[0];
+    let mut state = settled;
     let mut before = values[0];
     for value in values.iter_mut() {
         let now = *value;

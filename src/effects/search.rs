@@ -20,7 +20,7 @@ use super::response::Driver;
 use super::rival::Rival;
 use super::surrogate::NullGains;
 use super::term::{Scratch, Term, law_parameters, time_of};
-use crate::reading::Timestamp;
+use crate::reading::{Timestamp, figure};
 
 /// Most effects in one law.
 const MOST_EFFECTS: usize = 10;
@@ -344,12 +344,13 @@ impl Search<'_> {
         };
         let (before, after) = held.errors(self.problem);
         let ratio = after / before.max(1e-300);
-        // A law that runs away within the block says nothing of a covariate: what happens from reading to reading does.
+        // Where the law runs away within the block also without a covariate, that says nothing of it: what happens from reading to reading does.
         let is_judged = one.term.kind.definition().support != Support::Covariate
-            || StepErrors::is_a_figure(self.problem, after);
+            || StepErrors::is_a_figure(self.problem, after)
+            || StepErrors::is_a_figure(self.problem, before);
         if is_judged && (!ratio.is_finite() || ratio > most_extrapolated(one.term.kind)) {
             let reason = if ratio <= RUNS_AWAY {
-                format!("the held-out error grows to {:.0} %", 100.0 * ratio)
+                format!("the held-out error grows to {} %", figure(100.0 * ratio, 4))
             } else {
                 "with it the held-out error is over a thousand times as large".to_owned()
             };

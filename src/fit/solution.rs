@@ -7,7 +7,7 @@ use crate::model::Law;
 pub struct Solution {
     /// The law, t = 0 at the first reading, velocity in the readings' unit (a length's per day).
     pub law: Law,
-    /// Modelled displacement at the first reading; 0 for velocities.
+    /// Modelled displacement at the first reading, in the readings' unit; 0 for velocities.
     pub displacement_at_start: f64,
     /// Root mean square of the residuals, in the readings' unit.
     pub rms: f64,

@@ -11,6 +11,7 @@ use super::evidence::{self, Evidence};
 use super::learned::LEARNED;
 use super::members::{LONGEST_DAYS, MOST, Members};
 use super::network::{INPUTS, Network};
+use super::sudden::slowed;
 use super::{Passage, PastEvent, Scale, Scales};
 use crate::fit::Observations;
 
@@ -80,6 +81,8 @@ pub struct Indicators {
     /// The same of the readings since an event that stands out of all else: beside it no later acceleration would look like
     /// one. And the share of their chance that counts for levels.
     later: Option<(f64, Box<Self>)>,
+    /// The same of the motion slowed down, where it is many times as fast as ever before.
+    slower: Option<Box<(Self, Members)>>,
 }
 
 impl Indicators {
@@ -93,6 +96,10 @@ impl Indicators {
             let share = LATER * event.share * as_fast_as(&event, &later.scales);
             Some((share, Box::new(later)))
         });
+        whole.slower = slowed(observations).and_then(|slower| {
+            let scales = Scales::of(&slower)?;
+            Some(Box::new((Self::by(&slower, scales), Members::of(&slower))))
+        });
         Some(whole)
     }
 
@@ -101,6 +108,7 @@ impl Indicators {
             evidence: Evidence::of(observations, &scales),
             scales,
             later: None,
+            slower: None,
         }
     }
 
@@ -136,6 +144,7 @@ impl Indicators {
         let later = self.later.as_ref();
         counted.any(|most| most >= chance)
             || later.is_some_and(|(share, later)| later.may_reach(days, chance / share))
+            || (self.slower.as_deref()).is_some_and(|(slower, _)| slower.may_reach(days, chance))
     }
 
     /// The inputs of every span with its length, days.
@@ -152,7 +161,12 @@ impl Indicators {
 
     /// The same by another network.
     pub fn collapse_by(&self, network: &Network, members: &Members) -> Collapse {
-        let (all, sure) = self.chances_by(network, members);
+        let (mut all, mut sure) = self.chances_by(network, members);
+        if let Some((slower, expected)) = self.slower.as_deref() {
+            let (others, counted) = slower.chances_by(network, expected);
+            at_least(&mut all, &others);
+            sure = sure.at_least(&counted);
+        }
         let sure = match &self.later {
             Some((share, later)) => {
                 let (_, since) = later.chances_by(network, members);
@@ -295,6 +309,13 @@ fn growth(scales: &Scales, (power, span): (usize, f64)) -> impl Iterator<Item = 
         let deviation = scale.near.usual.hypot(UNEVEN * expected);
         expected * (scale.near.newest - 0.5 * expected) / (deviation * deviation)
     })
+}
+
+/// `chances` within each span no less than `others` of the same spans.
+fn at_least(chances: &mut [(f64, f64)], others: &[(f64, f64)]) {
+    for (own, other) in chances.iter_mut().zip(others) {
+        own.1 = own.1.max(other.1);
+    }
 }
 
 fn spans(scales: &Scales) -> impl Iterator<Item = (usize, f64)> {

@@ -15,6 +15,7 @@ mod passage;
 mod past_event;
 mod scales;
 mod sessions;
+mod sudden;
 mod surprise;
 mod together;
 

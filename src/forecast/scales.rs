@@ -49,9 +49,9 @@ pub struct Scale {
     pub days: f64,
     /// Between the two newest blocks, mm/day.
     pub velocity: f64,
-    /// The highest one before, and the median of all before, mm/day.
+    /// The highest one before, of blocks other than the two newest, mm/day.
     pub highest_velocity: f64,
-    /// See [`Scale::highest_velocity`].
+    /// The median of all before, mm/day.
     pub median_velocity: f64,
     /// From one block to the next.
     pub near: VelocityChange,

@@ -8,8 +8,8 @@ const UNSETTLED: &str = "The parameters have no intervals: the laws that were dr
      as where readings scatter far less than laws can be distinguished by. Go by the best fit, without an error.";
 /// Said where the two regimes differ after the velocity has stood still.
 const STOOD_STILL: &str = "The two regimes differ, and the newest readings do not decide between them: over the last third of the record the \
-     velocity stayed the same within 10 %. What they disagree about is whether the slope will gather speed again. The first lets the \
-     load change, trusts old readings less, and takes most slopes that are watched for unstable until readings say otherwise; the \
+     velocity stayed the same within 10 %. What they disagree about is whether the slope will accelerate again. The first lets the \
+     load change, gives old readings less weight, and takes most slopes that are watched for unstable until readings say otherwise; the \
      monitor, and the chance of a failure above, go by it. The second takes the load for constant over the whole record, and goes by \
      how the velocity came to rest. By these readings alone the regime is undetermined.";
 

@@ -72,9 +72,9 @@ pub struct UnderPrior {
     pub prior: &'static str,
     /// Every regime's probability.
     pub probabilities: BTreeMap<Regime, f64>,
-    /// Chance that the critical velocity is passed within the horizon.
+    /// Chance that the critical velocity is passed within the horizon: not that of a collapse.
     pub failure_probability: f64,
-    /// When, at an unconditional 50 %.
+    /// When the chance that the critical velocity has been passed comes to 50 %, unconditional; null where it does not within the horizon.
     pub failure_median: Option<Timestamp>,
 }
 
@@ -87,9 +87,9 @@ pub struct Alternative {
     pub x_i: Option<f64>,
     /// T, days.
     pub t_unit_days: Option<f64>,
-    /// D.
+    /// D, in the readings' velocity unit (for displacements, their length per day).
     pub d: Option<f64>,
-    /// Root mean square residual.
+    /// Root mean square residual, in the readings' unit.
     pub rms: Option<f64>,
     /// Its regime.
     pub regime: Regime,

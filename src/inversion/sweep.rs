@@ -73,7 +73,7 @@ pub struct SweepRow {
     pub inverse_velocity: FittedInverseVelocity,
     /// The distinct minima of the misfit, best first.
     pub alternatives: Alternatives,
-    /// Root mean square residual of the best fit.
+    /// Root mean square residual of the best fit, in the readings' unit.
     pub rms: Option<f64>,
     /// Why the best fit ended.
     pub termination: String,

@@ -31,9 +31,9 @@ pub struct PaperParameters {
     pub x_i: Option<f64>,
     /// Time unit T = `D_c/D`, days.
     pub t_unit_days: Option<f64>,
-    /// Velocity scale D.
+    /// Velocity scale D, in the unit of [`Law::v_i`], a length per day.
     pub d: Option<f64>,
-    /// Characteristic slip `D_c`.
+    /// Characteristic slip `D_c`, in that length.
     pub d_c: Option<f64>,
     /// S `theta_i` = b/a.
     pub s_theta_i: Option<f64>,
@@ -42,9 +42,9 @@ pub struct PaperParameters {
 /// Where a law with a stable regime ends up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SteadyState {
-    /// It approaches this velocity.
+    /// It approaches this velocity, in the unit of [`Law::v_i`], a length per day.
     Approached(f64),
-    /// There is such a velocity, and the law departs from it.
+    /// There is such a velocity, in the same unit, and the law departs from it.
     Departed(f64),
     /// No steady velocity.
     None,

@@ -16,6 +16,8 @@ pub struct LevelStretch {
     pub from: Timestamp,
     /// When it was left, or the end of what is known.
     pub to: Timestamp,
+    /// Whether it is in force at the end of what is known.
+    pub is_in_force: bool,
 }
 
 /// Every stretch of one level within `first` and `last`; then those in which it was unknown, which stand beside
@@ -101,6 +103,7 @@ impl LevelCourse {
                 level: self.level,
                 from: self.since,
                 to: at,
+                is_in_force: false,
             });
         }
         self.level = level;
@@ -113,6 +116,7 @@ impl LevelCourse {
             level: self.level,
             from: self.since,
             to: end.max(self.since),
+            is_in_force: true,
         });
         self.past
     }

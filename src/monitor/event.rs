@@ -13,7 +13,8 @@ use std::collections::BTreeMap;
 /// One thing that the monitor says.
 #[derive(Debug, Clone, PartialEq, JsonSchema, Serialize, Deserialize)]
 pub struct Event {
-    /// Data time: the measured-at time of the reading that caused it.
+    /// Data time: that of the newest reading, or that at which something was due without one (`no-data`). Of an order it is this time too, not the
+    /// time at which it was given. Before the first reading it is 1677-09-21T00:12:44Z; a hook is given the clock's time instead.
     pub time: Timestamp,
     /// What happened.
     #[serde(flatten)]
@@ -62,7 +63,7 @@ pub enum EventKind {
         #[serde(skip_serializing_if = "Option::is_none", default)]
         plain: Option<Box<Plain>>,
     },
-    /// The probability of instability crossed over.
+    /// The regime in force changed: another one had a probability of 0.8 or more at two refits in a row.
     RegimeFlip {
         /// The regime before.
         from: Regime,
@@ -77,9 +78,10 @@ pub enum EventKind {
         from: Timestamp,
         /// The intercept now.
         to: Timestamp,
-        /// How fast it moves, days a day of new readings.
+        /// How fast it moves, days a day of new readings; below 0 to an earlier time.
         drift_days_per_day: f64,
-        /// How fast the fitted law itself would have it move.
+        /// How fast it would move if the fitted law held, days a day of new readings; below 0 to an earlier time. Null where the law says nothing
+        /// of it.
         expected_days_per_day: Option<f64>,
     },
     /// The transition time moved with `t_max`.
@@ -88,7 +90,7 @@ pub enum EventKind {
         from: Timestamp,
         /// The transition time now.
         to: Timestamp,
-        /// How fast it moves, days a day of new readings.
+        /// How fast it moves, days a day of new readings; below 0 to an earlier time.
         drift_days_per_day: f64,
     },
     /// What the readings show and the law in force does not explain.

@@ -38,7 +38,7 @@ impl Measured<'_> {
         }
     }
 
-    /// The number.
+    /// The number, in the unit in which it was read.
     pub fn value(&self) -> f64 {
         match self {
             Self::Reading { reading, .. } => reading.value,
@@ -46,7 +46,7 @@ impl Measured<'_> {
         }
     }
 
-    /// Its standard error, where one is stated.
+    /// Its standard error, in the same unit, where one is stated.
     pub fn sigma(&self) -> Option<f64> {
         match self {
             Self::Reading { reading, .. } => reading.sigma,

@@ -9,6 +9,12 @@ use std::collections::VecDeque;
 const REMEMBERED: usize = 9;
 /// A benchmark may skip this many of its usual readings.
 pub const MAY_SKIP: i32 = 4;
+/// Where readings are lost one by one it may skip as many more as chance makes so many times a day, at most so many.
+const BY_CHANCE_A_DAY: f64 = 0.02;
+const MOST_SKIPPED: i32 = 12;
+/// Readings over which the share that is lost is learnt, and fewest.
+const LEARNT_OVER: f64 = 64.0;
+const FEWEST_LEARNT: f64 = 24.0;
 /// So many gaps between bursts of readings make a rhythm.
 const CYCLES: u8 = 4;
 /// A benchmark with a single reading is called silent after this time: it may be one that is read once a week.
@@ -28,6 +34,9 @@ pub(super) struct Silence {
     #[serde(default)]
     gaps: VecDeque<(Timestamp, SignedDuration)>,
     silent: bool,
+    /// Readings lost one by one of late, and readings that there were to be.
+    #[serde(default)]
+    lost: (f64, f64),
     /// What time it was when a reading came that was measured long before.
     #[serde(default)]
     behind: Option<Timestamp>,
@@ -44,6 +53,7 @@ impl Silence {
             // the benchmark is read more seldom from now on, a few readings are enough to learn it.
             let spacing = time.duration_since(newest);
             self.note_gap(newest, spacing);
+            self.note_lost(spacing);
             let most = self
                 .allowed()
                 .and_then(|allowed| allowed.checked_mul(MAY_SKIP));
@@ -190,6 +200,35 @@ impl Silence {
         (is_rhythm && since < outlasted(period_s)).then_some(Rhythm { period_s, gap_s })
     }
 
+    /// Counts the readings that are missing in a short gap.
+    fn note_lost(&mut self, spacing: SignedDuration) {
+        let Some(usual) = self.median().map(|usual| usual.as_secs_f64()) else {
+            return;
+        };
+        let due = (spacing.as_secs_f64() / usual).round().max(1.0);
+        if due <= f64::from(MOST_SKIPPED) {
+            let keeps = 1.0 - 1.0 / LEARNT_OVER;
+            let (lost, of) = self.lost;
+            self.lost = (keeps * lost + due - 1.0, keeps * of + due);
+        }
+    }
+
+    /// How many of its usual readings it may skip: more than [`MAY_SKIP`] where so many are lost one by one that chance makes such a gap.
+    fn may_skip(&self, usual: SignedDuration) -> i32 {
+        let (lost, of) = self.lost;
+        // What so few readings leave open of it counts.
+        let share = lost / of;
+        let share = share + (share * (1.0 - share).max(0.0) / of).sqrt();
+        if of < FEWEST_LEARNT || share <= 0.0 || share >= 1.0 {
+            return MAY_SKIP;
+        }
+        let a_day = 86_400.0 / usual.as_secs_f64().max(1.0);
+        let skipped = (BY_CHANCE_A_DAY / a_day).ln() / share.ln();
+        (MAY_SKIP..MOST_SKIPPED)
+            .find(|skip| f64::from(*skip) >= skipped)
+            .unwrap_or(MOST_SKIPPED)
+    }
+
     /// For how long it may be silent.
     fn allowed(&self) -> Option<SignedDuration> {
         let longest = self.spacings.iter().max().copied();
@@ -198,7 +237,10 @@ impl Silence {
             // Two or three readings say little of how often there are some.
             Some(longest) if self.spacings.len() < 3 => longest.checked_mul(MAY_SKIP)?,
             // The longest gap seen lately is no silence either.
-            Some(longest) => self.median()?.checked_mul(MAY_SKIP)?.max(longest),
+            Some(longest) => {
+                let usual = self.median()?;
+                usual.checked_mul(self.may_skip(usual))?.max(longest)
+            }
         };
         let rhythm = self.rhythm();
         let between = rhythm.map_or(LEAST, |rhythm| {
@@ -288,6 +330,35 @@ mod tests {
             let due = days.deadline().unwrap();
             assert!(at(next + 24.0) < due && due < at(next + 40.0), "{due}");
         }
+    }
+
+    #[test]
+    fn where_single_readings_are_lost_all_the_time_a_gap_that_chance_makes_is_no_silence() {
+        let mut silence = Silence::default();
+        let mut state = 1_u32;
+        let (mut silences, mut due) = (0, None);
+        for index in 0..1440 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            // Three of ten are lost, each ten minutes.
+            if state >> 16 < 19_660 {
+                continue;
+            }
+            let time = at(f64::from(index) / 6.0);
+            silences += usize::from(due.is_some_and(|due| due <= time) && index > 144);
+            silence.broken_by(time);
+            due = silence.deadline();
+        }
+        assert!(silences <= 1, "{silences}");
+        let newest = silence.newest().unwrap();
+        let hours = due.unwrap().duration_since(newest).as_secs_f64() / 3600.0;
+        assert!((1.0..2.1).contains(&hours), "{hours}");
+        // Without losses four are missed.
+        let whole = after_bursts(&[0.0, 20.0 / 12.0, 40.0 / 12.0, 60.0 / 12.0]);
+        let hours = whole
+            .deadline()
+            .unwrap()
+            .duration_since(whole.newest().unwrap());
+        assert_eq!(hours, SignedDuration::from_mins(30));
     }
 
     #[test]

@@ -115,8 +115,13 @@ impl Monitor {
         let changed: Vec<(BenchmarkId, String)> = (self.benchmarks.all().keys())
             .filter_map(|id| {
                 let read_as = watched.changed(id, former)?;
+                let read_as = if read_as.is_empty() {
+                    "the files themselves say"
+                } else {
+                    &read_as
+                };
                 let why = format!(
-                    "benchmark {id} is read as {read_as} from here on: its readings are taken anew; a level in force stays until \
+                    "benchmark {id} is read as {read_as} from here on: its readings are read again; a level in force stays until \
                      they, or people, end it"
                 );
                 Some((id.clone(), why))

@@ -14,6 +14,8 @@ const LEAST_RATIO: f64 = 4.0;
 /// The readings before the change from which their usual step is learnt; fewer than the least show nothing.
 const INSPECTED: usize = 48;
 const FEWEST: usize = 16;
+/// Displacements that far from zero, in their scatter, show a change of the unit by their values.
+const FAR: f64 = 12.0;
 /// What goes on from the readings before lies within so many times their scatter. Of normal noise nearly all does,
 const GOES_ON: f64 = 4.0;
 /// and multiplied by no more than ten within so many times, as what was reset may come near there.
@@ -28,6 +30,16 @@ const SCATTERS: f64 = 0.5;
 const BACK: u32 = 4;
 /// which are those within this share of what the last one in the other unit was in the former.
 const NEAR: f64 = 0.5;
+/// So many readings that range over a hundredth, say, of what the former ones did show it too, where these lie too near to zero for their
+/// values to: the quietest so many of the [`INSPECTED`] are compared with them.
+const QUIET: usize = 16;
+/// Their ranges are in the ratio of the units within this factor.
+const RANGES_ALIKE: f64 = 3.0;
+/// A smaller ratio than this is that of quiet days too, and shows only where the former readings stand so many times their scatter from zero.
+const MUCH_QUIETER: f64 = 100.0;
+const CLEAR_OF_ZERO: f64 = 3.0;
+/// What they are multiplied goes on within so many times the scatter.
+const GOES_ON_QUIETLY: f64 = 6.0;
 /// No value has more digits behind its point.
 const MOST_DECIMALS: i32 = 9;
 
@@ -46,6 +58,9 @@ pub struct OtherUnit {
     back: u32,
     /// Whether as many readings show it as it takes: until then the next one may contradict it.
     is_confirmed: bool,
+    /// Whether how little the readings scatter shows it, which no reset of the instrument changes.
+    #[serde(default)]
+    is_by_scatter: bool,
 }
 
 /// So many readings in the other unit show it. A velocity may fall by such a ratio too, but hardly with all of its scatter.
@@ -63,7 +78,7 @@ pub fn looked_at(quantity: Quantity) -> usize {
 
 /// How many of the newest readings [`OtherUnit::at_end`] goes by.
 pub fn gone_by(quantity: Quantity) -> usize {
-    INSPECTED + confirming(quantity)
+    INSPECTED + confirming(quantity).max(QUIET)
 }
 
 /// Whether two of these readings in a row may be in different units, as far as it can be known without sorting any.
@@ -88,6 +103,48 @@ impl OtherUnit {
         })
     }
 
+    /// The change to a larger unit that the newest of `readings`, in order of time, show by how little they scatter: displacements near zero.
+    pub fn quiet_since(readings: &[(Timestamp, f64)], quantity: Quantity) -> Option<Self> {
+        let at = readings.len().checked_sub(QUIET)?;
+        let (before, after) = readings.split_at(at);
+        let before = &before[before.len().saturating_sub(INSPECTED)..];
+        if before.len() < INSPECTED || quantity == Quantity::Velocity {
+            return None;
+        }
+        let quietest = before
+            .chunks_exact(QUIET)
+            .map(span)
+            .fold(f64::INFINITY, f64::min);
+        let ratio = quietest / span(after);
+        let steps: Vec<f64> = before.windows(2).map(|two| two[1].1 - two[0].1).collect();
+        let (_, scatter) = scatter_of(&steps).filter(|_| ratio.is_finite())?;
+        let (last, first) = (*before.last()?, *after.first()?);
+        let mean = after.iter().map(|one| one.1).sum::<f64>() / QUIET as f64;
+        let is_clear = last.1.abs() >= CLEAR_OF_ZERO * scatter;
+        if last.1.abs() >= FAR * scatter {
+            return None;
+        }
+        let is_it = |factor: &f64| {
+            (factor / RANGES_ALIKE..factor * RANGES_ALIKE).contains(&ratio)
+                && (*factor >= MUCH_QUIETER || is_clear)
+                && (factor * mean - last.1).abs() <= GOES_ON_QUIETLY * scatter
+        };
+        let apart = |factor: &f64| (factor / ratio).ln().abs();
+        let factor = OF_LENGTHS
+            .into_iter()
+            .filter(is_it)
+            .min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+        Some(Self {
+            factor,
+            before: last,
+            first,
+            newest: after.last()?.1,
+            back: 0,
+            is_confirmed: true,
+            is_by_scatter: true,
+        })
+    }
+
     fn between(
         before: &[(Timestamp, f64)],
         after: &[(Timestamp, f64)],
@@ -106,7 +163,7 @@ impl OtherUnit {
         let scatter = scatter.max(last_digit(before));
         // Nearer to zero than this, any reading goes on from them, whatever it is multiplied by.
         let (far, ratios): (f64, &[f64]) = match quantity {
-            Quantity::Displacement => (12.0 * scatter, &OF_LENGTHS),
+            Quantity::Displacement => (FAR * scatter, &OF_LENGTHS),
             Quantity::Velocity => (6.0 * scatter, &OF_VELOCITIES),
         };
         let lies_far = |value: f64| (value - last.1).abs() >= far;
@@ -141,6 +198,7 @@ impl OtherUnit {
             newest: after.last()?.1,
             back: 0,
             is_confirmed,
+            is_by_scatter: false,
         })
     }
 
@@ -154,6 +212,11 @@ impl OtherUnit {
     /// Whether it holds until readings in the former unit come.
     pub fn is_confirmed(&self) -> bool {
         self.is_confirmed
+    }
+
+    /// Whether a reset of the instrument explains it as well.
+    pub fn may_be_a_reset(&self) -> bool {
+        !self.is_by_scatter
     }
 
     /// When the last reading in the former unit was taken,
@@ -211,10 +274,14 @@ pub fn standing(readings: &[(Timestamp, f64)], quantity: Quantity) -> Option<Oth
         let so_far = &readings[..end];
         change = match change.filter(OtherUnit::is_confirmed) {
             Some(mut stands) => stands.goes_on(readings[end - 1].1).then_some(stands),
-            None if may_have_changed(&so_far[end.saturating_sub(looked_at(quantity))..]) => {
-                OtherUnit::at_end(&so_far[end.saturating_sub(gone_by(quantity))..], quantity)
+            None => {
+                let newest = &so_far[end.saturating_sub(gone_by(quantity))..];
+                let may_have = may_have_changed(&so_far[end.saturating_sub(looked_at(quantity))..]);
+                let jumped = may_have
+                    .then(|| OtherUnit::at_end(newest, quantity))
+                    .flatten();
+                jumped.or_else(|| OtherUnit::quiet_since(newest, quantity))
             }
-            None => None,
         };
     }
     change
@@ -288,6 +355,33 @@ mod tests {
                 assert!(found.is_confirmed && found.at() == readings[480].0);
                 assert!((found.factor / factor - 1.0).abs() < 1e-9, "{found:?}");
             }
+        }
+    }
+
+    #[test]
+    fn a_larger_unit_near_zero_is_found_by_how_little_the_readings_scatter() {
+        let mut rng = Pcg64::seed_from_u64(3);
+        let mut found = 0;
+        for (factor, level) in [(1000.0, 1.0), (1000.0, 6.0), (100.0, 3.0), (10.0, 8.0)] {
+            let values = (0..120).map(|hour| {
+                let value = level + 0.01 * f64::from(hour) + 0.8 * normal(&mut rng);
+                let by = if hour < 80 { 1.0 } else { factor };
+                rounded(value / by, 5)
+            });
+            let readings = hourly(values);
+            let at_end = |end: usize| standing(&readings[..end], Quantity::Displacement);
+            assert_eq!(at_end(80), None, "{factor}");
+            let all = at_end(120).unwrap_or_else(|| panic!("{factor}, {level}"));
+            found += usize::from((all.factor / factor - 1.0).abs() < 1e-9);
+            assert!(all.is_confirmed && !all.may_be_a_reset(), "{all:?}");
+        }
+        assert!(found >= 3, "{found}");
+        // A reset, and a night on which the air is quiet.
+        let quiet = |hour: i32| if (80..100).contains(&hour) { 0.12 } else { 0.8 };
+        let night = (0..120).map(|hour| 6.0 + quiet(hour) * normal(&mut rng));
+        let readings = hourly(night);
+        for end in 60..=120 {
+            assert_eq!(standing(&readings[..end], Quantity::Displacement), None);
         }
     }
 

@@ -67,12 +67,10 @@ pub enum SelectError {
     },
     /// More than one fits.
     #[error(
-        "{asked} fits several series: choose with --benchmark or --quantity among {}",
+        "several series match; choose one with --benchmark or --quantity: {}",
         listed(fitting)
     )]
     Several {
-        /// What was asked for.
-        asked: String,
         /// What fits.
         fitting: Vec<String>,
     },
@@ -156,7 +154,6 @@ impl Recording {
                 available: self.series.iter().map(title).collect(),
             }),
             several => Err(SelectError::Several {
-                asked: asked(benchmark, quantity),
                 fitting: several.iter().copied().map(title).collect(),
             }),
         }

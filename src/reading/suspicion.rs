@@ -308,8 +308,9 @@ fn scatter(readings: &[(Timestamp, f64)]) -> Option<(f64, f64)> {
     scatter_of(&steps)
 }
 
-/// The usual step from one reading to the next, and how steps scatter about it, no less than the usual size of one;
-/// `None` where they do not. Values that are given twice, or are rounded, have steps of 0 between them: these say nothing of the others.
+/// The median step from one reading to the next, and the scatter of the steps about it, both in the unit of the steps. The scatter is 1.4826 times
+/// their median distance from the median step, and no less than their median size; `None` where it is 0. Values that are given twice, or are
+/// rounded, have steps of 0 between them: these do not count in the scatter where enough others are there.
 pub fn scatter_of(steps: &[f64]) -> Option<(f64, f64)> {
     let moved: Vec<f64> = steps.iter().copied().filter(|step| *step != 0.0).collect();
     let usual = median(steps.iter().copied())?;

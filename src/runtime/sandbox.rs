@@ -43,11 +43,11 @@ pub const CANNOT_RUN: u8 = 126;
 /// What its last line on stderr begins with then: a hook may end with that code too.
 pub const CANNOT_RUN_BECAUSE: &str = "the hook cannot be run: ";
 
-/// Why a hook could not be walled in or started.
+/// Why the sandbox of a hook could not be set up, or the hook not started.
 #[derive(Debug, thiserror::Error)]
 pub enum SandboxError {
     /// The kernel refused.
-    #[error("{CANNOT_RUN_BECAUSE}it cannot be walled in: {0}")]
+    #[error("{CANNOT_RUN_BECAUSE}the sandbox cannot be set up: {0}")]
     Refused(#[from] RulesetError),
     /// The program cannot be run.
     #[error("{CANNOT_RUN_BECAUSE}{}: {source}", .program.display())]

@@ -3,17 +3,17 @@
 
 use crate::forecast::Passage;
 
-/// No forecast is scored beyond this many days,
+/// No forecast is scored beyond this many days.
 pub const LONGEST_SCORED_DAYS: f64 = 60.0;
-/// nor beyond this many lengths of the record that it was made from.
+/// No forecast is scored beyond this many lengths of the record that it was made from.
 pub const RECORDS_SCORED: f64 = 5.0;
 /// A probability that is never given away, so that one bad surprise does not decide a mean of logarithms.
 const SURPRISE: f64 = 0.01;
-/// The log score is that of the probability given to a class of times: so many to a decade,
+/// The log score is that of the probability given to a class of times: so many classes to a decade of days.
 const CLASSES_A_DECADE: f64 = 10.0;
-/// from this many days
+/// The classes begin at this many days.
 const FIRST_CLASS_DAYS: f64 = 0.01;
-/// over so many decades; sooner and later are classes of their own.
+/// The classes cover so many decades; sooner and later are classes of their own.
 const DECADES: f64 = 4.0;
 
 /// What came of a slope after a forecast.

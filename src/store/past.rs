@@ -29,7 +29,7 @@ pub struct Value {
     pub time: Timestamp,
     /// In mm or mm/day for a reading, as it came for a covariate.
     pub value: f64,
-    /// Its standard error, where it was given.
+    /// Its standard error, in the unit of `value`, where it was given.
     pub sigma: Option<f64>,
     /// What a reading measures; `None` for a covariate.
     pub quantity: Option<Quantity>,

@@ -59,28 +59,49 @@ fn a_unit_of_the_units_line_that_cannot_be_read_is_named_and_mm_is_not_proposed(
 }
 
 #[test]
-fn a_header_that_comes_again_without_the_column_of_a_benchmark_is_said() {
-    let head = |unit: &str| {
+fn a_header_that_comes_again_without_the_column_of_a_benchmark_is_a_warning() {
+    let head = |name: &str, unit: &str| {
         format!(
-            "\"TOA5\",\"a\",\"b\",\"c\",\"d\",\"e\",\"f\",\"g\"\n\"TIMESTAMP\",\"Ext1\"\n\"TS\",\"{unit}\"\n\"\",\"Smp\"\n"
+            "\"TOA5\",\"a\",\"b\",\"c\",\"d\",\"e\",\"f\",\"g\"\n\"TIMESTAMP\",\"{name}\"\n\"TS\",\"{unit}\"\n\"\",\"Smp\"\n"
         )
     };
     let row = |time: jiff::civil::DateTime, value: f64| {
-        let again = if time.day() == 2 && time.hour() == 0 {
-            head("cm")
-        } else {
-            String::new()
+        let again = match (time.day(), time.hour()) {
+            (2, 0) => head("Ext1", "cm"),
+            (2, 6) => head("Ext2", "mm"),
+            _ => String::new(),
         };
+        let value = if time.day() == 1 { value } else { value / 10.0 };
         format!("{again}\"{}\",{value}\n", time.strftime("%F %T"))
     };
-    let text = format!("{}{}", head("mm"), rows(40, row));
+    let text = format!("{}{}", head("Ext1", "mm"), rows(40, row));
     let more =
         "time_zone = \"UTC\"\n[[benchmark]]\nid = \"T\"\ncolumn = \"Ext1_mm\"\nunit = \"mm\"\n";
     let config = site("a.dat", more).replace("\"csv\"", "\"toa5\"");
     let office = Office::with(&[("a.dat", &text), ("site.toml", &config)]);
+    let said = checked(&office);
     contains_all(
-        &checked(&office),
-        &["has no column \"Ext1_mm\", where the readings of benchmark \"T\" stood"],
+        &said,
+        &[
+            "warning: source \"logger\"",
+            "has no column \"Ext1_mm\", where the readings of benchmark \"T\" stood",
+            "has \"Ext1_mm\" in cm, and it was \"Ext1_mm\" in mm before",
+            "benchmark T (logger): 30 readings",
+        ],
+    );
+    // A command without a config reads the rows above it.
+    let mapped = [
+        "fit",
+        "a.dat",
+        "--time-zone",
+        "UTC",
+        "--column",
+        "Ext1_mm=T:displacement:mm",
+    ];
+    let (_, out, err) = office.say(&mapped);
+    assert!(
+        !format!("{out}{err}").contains("no file has a column"),
+        "{out}{err}"
     );
 }
 

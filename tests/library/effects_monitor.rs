@@ -288,15 +288,15 @@ fn an_effect_is_reported_once_and_its_end_too() {
     let mut monitor = monitor(Explain::Adopt);
     let wet = wet_spring();
     let part = Measured {
-        readings: wet.readings[..60].to_vec(),
-        samples: wet.samples[..60].to_vec(),
+        readings: wet.readings[..90].to_vec(),
+        samples: wet.samples[..90].to_vec(),
         fails: None,
     };
-    let first = play(&mut monitor, &part, Some(&(50, found(STANDS))));
+    let first = play(&mut monitor, &part, Some(&(80, found(STANDS))));
     let is_found =
         |event: &&Event| matches!(event.kind, EventKind::EffectFound { adopted: true, .. });
     assert_eq!(first.iter().filter(is_found).count(), 1);
-    let now = part.readings[59].time;
+    let now = part.readings[89].time;
     let again = monitor.step(now, &Input::Found(found(STANDS)));
     assert_eq!(again, [], "known");
     let nothing = SearchFinding {

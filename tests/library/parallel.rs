@@ -106,7 +106,7 @@ fn under_a_known_load_too() {
         };
         inputs.push((reading.time, sample));
         for id in ["a", "b"] {
-            if day == 60 {
+            if day == 80 {
                 let benchmark = BenchmarkId::new(id);
                 let finding = SearchFinding {
                     benchmark,

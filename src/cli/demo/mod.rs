@@ -26,7 +26,7 @@ use std::path::Path;
 use std::time::Duration;
 use timeline::Timeline;
 
-/// Show the main job: archived crises played through the monitor as it would have lived them
+/// Show the main job: archived crises replayed through the monitor reading by reading
 ///
 /// Needs nothing. Alerts go to a sample hook, a real process; state lies in a temporary folder.
 #[derive(Debug, clap::Args)]

@@ -19,7 +19,7 @@ pub(super) fn legend() -> String {
     let percent = |chance: f64| (100.0 * chance).round();
     format!(
         "\
-Four archived slopes, played to the monitor as it would have lived them. A line
+Four archived slopes, replayed through the monitor reading by reading. A line
 is printed whenever the level of a measured point changes, with the reason:
 
   green    nothing to do; every point begins so
@@ -301,7 +301,7 @@ fn words(rule: &str) -> String {
         "steady" | "quiet" => "steady for long enough",
         "regime-flip" => "an unstable acceleration has begun",
         "intercept-drifting-in" => "the forecast date moves nearer",
-        "transition-drifting-in" => "the turn to acceleration moves nearer",
+        "transition-drifting-in" => "the inflection of the velocity moves nearer",
         "unexplained-residual" => "readings leave the law, cause unknown",
         "no-data" => "no reading when one was due",
         other => return other.replace('-', " "),

@@ -67,7 +67,9 @@ pub(super) const ALL: [(&str, &[&str]); 32] = [
     ),
     (
         "alerts ack",
-        &["slipwatch alerts ack --config site.toml --benchmark P1 --by Ada --why \"on the way\""],
+        &[
+            "slipwatch alerts ack --config site.toml --benchmark P1 --by \"the engineer on duty\" --why \"on the way\"",
+        ],
     ),
     (
         "alerts shelve",
@@ -84,7 +86,7 @@ pub(super) const ALL: [(&str, &[&str]); 32] = [
     (
         "alerts resolve",
         &[
-            "slipwatch alerts resolve --config site.toml --benchmark P1 --by Ada --why \"the wire was cut\"",
+            "slipwatch alerts resolve --config site.toml --benchmark P1 --by \"the engineer on duty\" --why \"the wire was cut\"",
         ],
     ),
     (

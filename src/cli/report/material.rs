@@ -85,7 +85,7 @@ pub(super) fn of_files(args: &Args) -> anyhow::Result<Material> {
     })
 }
 
-/// From the state of a site, as its daemon lived it.
+/// From the state of a site: what its daemon read and said.
 pub(super) fn of_state(args: &Args, file: &Path) -> anyhow::Result<Material> {
     let config = config::load(file)?;
     let folder = &config.site.state_dir;

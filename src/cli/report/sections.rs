@@ -22,7 +22,7 @@ pub(super) fn summary(material: &Material, series: &Series) -> String {
     let (levels, unknown) = levels_in(&material.events, Some(&series.benchmark), (first, last));
     let level = levels.last().map_or(Level::Green, |stretch| stretch.level);
     let since = levels.last().map_or(first, |stretch| stretch.from);
-    let unknown = unknown.last().filter(|stretch| stretch.to >= last);
+    let unknown = unknown.last().filter(|stretch| stretch.is_in_force);
     let unknown = unknown.map_or_else(String::new, |stretch| {
         format!(" and unknown since {}", time(Some(stretch.from)))
     });
@@ -39,21 +39,25 @@ pub(super) fn summary(material: &Material, series: &Series) -> String {
             Some(velocity) => write!(out, "; {} mm/day", figure(velocity, 3)),
             None => Ok(()),
         };
-        let _ = write!(
-            out,
-            "; collapse forecast {} (90 %: {} to {}; chance {} in {:.0} days)",
-            never(failure.median),
-            never(failure.low),
-            never(failure.high),
-            chance_in_words(failure.probability),
-            failure.horizon_days
-        );
+        let (chance, days) = (chance_in_words(failure.probability), failure.horizon_days);
+        let none = || format!("after {days:.0} days");
+        let at = |at: Option<Timestamp>| at.map_or_else(none, |at| time(Some(at)));
+        let _ = if failure.low.is_none() {
+            write!(
+                out,
+                "; no collapse forecast within {days:.0} days (chance {chance})"
+            )
+        } else {
+            write!(
+                out,
+                "; collapse forecast {} (90 %: {} to {}; chance {chance} in {days:.0} days)",
+                at(failure.median),
+                at(failure.low),
+                at(failure.high),
+            )
+        };
     }
     out + "."
-}
-
-fn never(at: Option<Timestamp>) -> String {
-    at.map_or_else(|| "never".to_owned(), |at| time(Some(at)))
 }
 
 fn newest_forecast(material: &Material, series: &Series) -> Option<(Option<f64>, FailureTime)> {

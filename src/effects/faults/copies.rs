@@ -19,6 +19,8 @@ const PERIODIC: f64 = 0.2;
 const NEAR: usize = 10;
 /// Share of a channel's values up to which one that stands in both rows counts as copied with them.
 const RARE: f64 = 0.1;
+/// Of the companions of a copied block this share agrees at least: a value may have been corrected.
+const AGREE: f64 = 0.8;
 /// How much what follows a value weighs its general frequency, in observations.
 const BACKING: f64 = 1.0;
 
@@ -120,12 +122,27 @@ fn information(copy: &Copied, language: &Language, companions: &[Companion]) -> 
     let further: f64 = (1..copy.rows)
         .map(|row| language.information_of_next(copy.newer + row))
         .sum();
-    let beside: f64 = (0..copy.rows)
-        .filter(|_| copy.newer - copy.older > NEAR)
-        .flat_map(|row| companions.iter().map(move |one| (one, row)))
-        .filter_map(|(one, row)| one.information(copy.older + row, copy.newer + row))
-        .sum();
-    language.first[copy.newer] + further + beside
+    language.first[copy.newer] + further + information_beside(copy, companions)
+}
+
+/// That of the companions. A row that was copied brings all of them along: where some differ, those that agree do so by chance.
+fn information_beside(copy: &Copied, companions: &[Companion]) -> f64 {
+    if copy.newer - copy.older <= NEAR {
+        return 0.0;
+    }
+    let rows = (0..copy.rows).map(|row| (copy.older + row, copy.newer + row));
+    let pairs = rows.flat_map(|rows| companions.iter().map(move |one| (one, rows)));
+    let (mut sum, mut agree, mut all) = (0.0, 0.0, 0.0);
+    for (one, (older, newer)) in pairs {
+        if one.symbols[older].is_some() && one.symbols[newer].is_some() {
+            all += 1.0;
+        }
+        if let Some(information) = one.information(older, newer) {
+            agree += 1.0;
+            sum += information;
+        }
+    }
+    if agree >= AGREE * all { sum } else { 0.0 }
 }
 
 /// What values usually stand and follow in a trace.

@@ -242,9 +242,13 @@ fn persists(trace: &Trace, reset: &ChannelReset) -> bool {
             .any(|opposite| opposite > PULSE_SHARE * size)
     });
     let before = median(&values[reset.from.saturating_sub(LEAST_BESIDE)..reset.from]);
+    // A lake that fell before goes on to fall; a flood does not go on to rise.
+    let steps = values[reset.from.saturating_sub(BESIDE)..reset.from].windows(2);
+    let drift = median(&steps.map(|pair| pair[1] - pair[0]).collect::<Vec<f64>>());
     let later = &values[reset.settled..(reset.settled + RETURN_AFTER).min(values.len())];
-    let returns = later
-        .iter()
-        .any(|value| (value - before) * sign < RETURN_NEAR * size);
+    let returns = (0..).map(f64::from).zip(later).any(|(steps, value)| {
+        let off = |drift: f64| (value - before - drift * (steps + 1.0)) * sign;
+        off(drift).max(off(0.0)) < RETURN_NEAR * size
+    });
     !is_end_of_pulse && !returns
 }

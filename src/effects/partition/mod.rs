@@ -128,7 +128,7 @@ fn search(
         return Err("the proportions stay constant".to_owned());
     }
     if found.factors.len() > 2 && 2 * found.factors.len() > found.groups.len() {
-        return Err("each goes its own way, not in groups".to_owned());
+        return Err("the benchmarks move independently, not in groups".to_owned());
     }
     stray(&scan, &aligned, &found)?;
     let p_value = surrogate::p_value(&scan, &found, options.surrogates, options.seed);

@@ -152,10 +152,10 @@ fn rain_acts_while_it_falls_and_not_from_the_end_of_its_day_on() {
         .map(|quarter| 1.0 + f64::from(quarter) / 4.0)
         .collect();
     let given = driver.respond_in_unit(of(Form::Level, 1, mean), &nodes);
-    // A store that fills evenly over each day, in small steps.
-    let (parts, mut store) = (1000, totals[0]);
-    let mut drained = vec![store];
-    for total in &totals[1..] {
+    // A store that fills evenly over each day, in small steps, from where what usually falls keeps it.
+    let (parts, mut store) = (1000, totals.iter().sum::<f64>() / totals.len() as f64);
+    let mut drained = Vec::new();
+    for total in &totals {
         for _ in 0..parts {
             store += (total - store) / (mean * f64::from(parts));
         }

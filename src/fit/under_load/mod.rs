@@ -75,7 +75,7 @@ pub struct Ensemble {
     pub now_days: f64,
     /// The laws; their weights sum to 1.
     pub samples: Vec<LawSample>,
-    /// Relative scatter of a rate about the law.
+    /// Standard deviation of a rate about the one by the law, as a fraction of it.
     pub scatter: f64,
 }
 

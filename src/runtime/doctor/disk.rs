@@ -119,7 +119,7 @@ fn kind(folder: &Path) -> nix::Result<(String, DiskKind)> {
     Ok(match known {
         Some((_, name, kind)) => ((*name).to_owned(), *kind),
         None => (
-            format!("a file system unknown to us ({magic:#x})"),
+            format!("an unknown file system ({magic:#x})"),
             DiskKind::Unsure,
         ),
     })

@@ -2,8 +2,9 @@
 
 use super::{CheckVerdict, Finding};
 use crate::config::Config;
-use notify::{RecursiveMode, Watcher};
+use notify::{ErrorKind, RecursiveMode, Watcher};
 use std::collections::BTreeSet;
+use std::io;
 use std::path::Path;
 
 const CHECK: &str = "inotify";
@@ -24,8 +25,14 @@ pub(super) fn finding(config: &Config) -> Finding {
                 .try_for_each(|folder| watcher.watch(folder, RecursiveMode::NonRecursive))
         },
     );
+    let is_of_rights = |error: &notify::Error| matches!(&error.kind, ErrorKind::Io(why) if why.kind() == io::ErrorKind::PermissionDenied);
     match tried {
         Ok(()) => Finding::new(CHECK, CheckVerdict::Good, limits),
+        Err(error) if is_of_rights(&error) => Finding::new(
+            CHECK,
+            CheckVerdict::Doubtful,
+            format!("{error}: give the daemon's user the right to read the folder"),
+        ),
         Err(error) => Finding::new(
             CHECK,
             CheckVerdict::Doubtful,

@@ -4,12 +4,19 @@ use super::Remark;
 use super::columns::{Column, Layout};
 use crate::reading::{BenchmarkId, Unit};
 
-/// The readings of a header: the column's name, whose they are, and in which unit.
+/// A column of readings: its name, whose they are, and in which unit.
+type ReadingColumn = (String, BenchmarkId, Unit);
+
+/// The readings of a header, and what columns there have been.
 #[derive(Debug, Clone, Default)]
-pub(super) struct HeaderReadings(Vec<(String, BenchmarkId, Unit)>);
+pub(super) struct HeaderReadings {
+    readings: Vec<ReadingColumn>,
+    /// Of every header so far, each name once.
+    names: Vec<String>,
+}
 
 impl HeaderReadings {
-    fn of(layout: &Layout) -> Self {
+    fn of(layout: &Layout) -> Vec<ReadingColumn> {
         let columns = layout.names.iter().zip(&layout.columns);
         let readings = columns.filter_map(|(name, column)| {
             if let Column::Reading {
@@ -21,34 +28,52 @@ impl HeaderReadings {
                 None
             }
         });
-        Self(readings.collect())
+        readings.collect()
+    }
+
+    /// The columns' names, of every header so far.
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
     }
 
     /// Takes the header at `line`, with remarks on what it changes.
     pub(super) fn follow(&mut self, line: u64, layout: &mut Layout) {
         let now = Self::of(layout);
-        for (name, benchmark, unit) in &self.0 {
+        for (name, benchmark, unit) in &self.readings {
             let quantity = unit.quantity();
-            let mut same = now.0.iter();
+            let mut same = now.iter();
             let same =
                 same.find(|(_, other, unit)| other == benchmark && unit.quantity() == quantity);
             let id = benchmark.as_str();
-            let text = match same {
+            let (about, text) = match same {
                 Some((.., is)) if is == unit => continue,
-                Some((other, _, is)) => format!(
-                    "line {line}: a header that comes again has {other:?} in {is}, and it was {name:?} in {unit} before: values are given in the \
+                Some((other, _, is)) => (
+                    format!("benchmark {id:?}"),
+                    format!(
+                        "line {line}: a header that comes again has {other:?} in {is}, and it was {name:?} in {unit} before: values are given in the \
                      first of both units; is the header right?"
+                    ),
                 ),
-                None => format!(
-                    "line {line}: a header that comes again has no column {name:?}, where the readings of benchmark {id:?} stood: below it there are \
+                None => (
+                    format!("benchmark {id:?}, column {name:?}"),
+                    format!(
+                        "line {line}: a header that comes again has no column {name:?}, where the readings of benchmark {id:?} stood: below it there are \
                      none of them. Put what follows into a file of its own, with a [[benchmark]] column that names its column"
+                    ),
                 ),
             };
             layout.remarks.push(Remark {
-                about: format!("benchmark {id:?}"),
+                is_loss: same.is_none(),
+                about,
                 text,
             });
         }
-        *self = now;
+        self.readings = now;
+        let fresh = layout
+            .names
+            .iter()
+            .filter(|name| !self.names.contains(name));
+        let fresh: Vec<String> = fresh.cloned().collect();
+        self.names.extend(fresh);
     }
 }

@@ -117,6 +117,7 @@ fn like_a_reading(name: &str) -> Option<Remark> {
     let unit = unit.filter(|unit| unit.quantity().name() == quantity);
     let unit = unit.map_or_else(|| "UNIT".to_owned(), Unit::column_suffix);
     Some(Remark {
+        is_loss: false,
         about: format!("column {name:?}"),
         text: format!(
             "named like a reading, and taken as a covariate; expected [ID_]displacement_UNIT with um, mm, cm, m, in or ft, \
@@ -129,6 +130,7 @@ fn like_a_reading(name: &str) -> Option<Remark> {
 /// That a column's readings are taken in the unit that is stated of their benchmark.
 fn in_stated_unit(name: &str, named: Unit, benchmark: &BenchmarkId, unit: Unit) -> Remark {
     Remark {
+        is_loss: false,
         about: format!("column {name:?}"),
         text: format!(
             "it is named as one in {named}, and taken in {unit}, as unit of [[benchmark]] {:?} says: is that right?",

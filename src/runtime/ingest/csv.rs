@@ -111,8 +111,9 @@ impl LineReader for CsvReader {
         self.rows.as_ref().map_or(&[], |rows| &rows.header)
     }
 
-    fn columns(&self) -> &[String] {
-        self.rows.as_ref().map_or(&[], CsvRows::columns)
+    fn columns(&self) -> Vec<String> {
+        let rows = self.rows.as_ref();
+        rows.map_or_else(Vec::new, |rows| rows.readings.names().to_vec())
     }
 
     fn finish(&self) -> Result<(), IngestError> {

@@ -228,6 +228,7 @@ impl IngestError {
             return None;
         };
         Some(Remark {
+            is_loss: false,
             about: "left out".to_owned(),
             text: format!("it has no readings, but topics {topics:?}"),
         })

@@ -239,6 +239,7 @@ impl<'a> Contents<'a> {
         let newest = self.newest.filter(|_| self.has_no_end)?;
         let messages = self.messages;
         Some(Remark {
+            is_loss: false,
             about: "has not ended".to_owned(),
             text: format!(
                 "it is still being written, or was cut off; read up to message {messages}, the last value taken being that of {newest}"

@@ -105,6 +105,18 @@ impl ReadOptions {
         self.reserved.contains(benchmark)
     }
 
+    /// The same with these in place of what maps the columns of their names.
+    fn with_columns(&self, others: Vec<ColumnMap>) -> Self {
+        let mut options = self.clone();
+        for other in others {
+            let mut own = options.columns.iter_mut();
+            if let Some(own) = own.find(|own| own.column == other.column) {
+                *own = other;
+            }
+        }
+        options
+    }
+
     /// The unit that is stated of a benchmark beside the one that its column's name has.
     fn unit_beside(&self, benchmark: &BenchmarkId, named: Unit) -> Option<Unit> {
         let of_it = |(id, unit): &&(BenchmarkId, Unit)| {

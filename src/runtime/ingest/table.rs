@@ -112,6 +112,7 @@ impl TableRows {
             "if it is a covariate's mark for no value, add it to missing (--missing)"
         };
         Remark {
+            is_loss: false,
             about: format!("column {:?}", self.layout.names[index]),
             text: format!(
                 "found {shown:?}, which is no number: no covariate, and not used; {cure}"

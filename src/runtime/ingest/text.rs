@@ -18,6 +18,7 @@ impl Remark {
     /// That a table is taken as Latin-1 from this line on.
     pub fn latin1(line: u64) -> Self {
         Self {
+            is_loss: false,
             about: "encoding".to_owned(),
             text: format!(
                 "line {line} is not in UTF-8: such lines are taken as Latin-1 (ISO 8859-1)"
@@ -28,6 +29,7 @@ impl Remark {
     /// That a file is in UTF-16.
     pub fn utf16() -> Self {
         Self {
+            is_loss: false,
             about: "encoding".to_owned(),
             text: "the file is in UTF-16, as its first bytes say, and is read as such".to_owned(),
         }
@@ -149,7 +151,7 @@ pub(super) fn read_text(
     if !bad.are_set_aside() {
         rows.0.finish()?;
     }
-    let columns = rows.0.columns().to_vec();
+    let columns = rows.0.columns();
     let (recording, disorder) = collected.finish(BTreeMap::new());
     if recording.series.is_empty() && recording.channels.is_empty() && disorder.missing == 0 {
         return Err(IngestError::Empty {

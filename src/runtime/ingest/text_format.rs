@@ -70,9 +70,9 @@ pub trait LineReader: Debug + Send {
         &[]
     }
 
-    /// The names of the columns.
-    fn columns(&self) -> &[String] {
-        &[]
+    /// The names of the columns, of every header that the file has had.
+    fn columns(&self) -> Vec<String> {
+        Vec::new()
     }
 
     /// What a whole file must have held.

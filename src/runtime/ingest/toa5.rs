@@ -75,8 +75,8 @@ impl LineReader for Toa5Rows {
         self.units_line.clone()
     }
 
-    fn columns(&self) -> &[String] {
-        self.table.as_ref().map_or(&[], TableRows::names)
+    fn columns(&self) -> Vec<String> {
+        self.readings.names().to_vec()
     }
 }
 
@@ -159,7 +159,7 @@ impl Toa5Rows {
             file: self.file.clone(),
             line,
             found,
-            expected: self.columns().len(),
+            expected: self.table.as_ref().map_or(0, |table| table.names().len()),
         }
     }
 
@@ -201,9 +201,18 @@ impl Toa5Rows {
         if names.get(0) != Some("TIMESTAMP") {
             return Err(bad(format!("{:?} and no TIMESTAMP", names.get(0))));
         }
+        let mut restated = Vec::new();
         let columns = names.iter().zip(&units);
-        let meant = columns.map(|(name, unit)| self.full_name(line - 2, name, unit));
+        let meant = columns.map(|(name, unit)| {
+            if let Some(map) = self.map_in_another_unit(name, unit) {
+                let column = map.column.clone();
+                restated.push(map);
+                return Ok(column);
+            }
+            self.full_name(line - 2, name, unit)
+        });
         let meant = meant.collect::<Result<Vec<String>, IngestError>>()?;
+        let options = self.options.with_columns(restated);
         let stated = meant.iter().zip(&units);
         let unread = stated.filter(|(_, unit)| {
             let is_known = Unit::parse(unit).is_ok() || known_suffix(unit).is_some();
@@ -212,7 +221,7 @@ impl Toa5Rows {
         self.units_line = unread
             .map(|(name, unit)| (name.clone(), unit.to_owned()))
             .collect();
-        let mut layout = Layout::new(&self.file, line - 2, meant, &self.options)?;
+        let mut layout = Layout::new(&self.file, line - 2, meant, &options)?;
         layout.remarks.extend(self.doubtful_units());
         for (column, (name, kind)) in layout.columns.iter_mut().zip(names.iter().zip(&processing)) {
             if name == "RECORD" || TIMES_OF_EXTREMES.contains(&kind) {
@@ -228,10 +237,31 @@ impl Toa5Rows {
             let named = self.units_line.get(&map.column)?;
             let (Measure::Reading(unit) | Measure::Sigma(unit)) = map.measure;
             Some(Remark {
+                is_loss: false,
                 about: format!("column {:?}", map.column),
                 text: format!(
                     "the units line has {named:?} for it, which is no unit that can be read, and it is taken in {unit}: is that right?"
                 ),
+            })
+        })
+    }
+
+    /// What the config maps to a column, in the unit that a header which comes again gives it: what stands below it is in that one.
+    fn map_in_another_unit(&self, name: &str, unit: &str) -> Option<ColumnMap> {
+        let stated = Unit::parse(unit).ok().filter(|_| !self.is_new)?;
+        let mut maps = self.options.columns.iter();
+        maps.find_map(|map| {
+            let (Measure::Reading(meant) | Measure::Sigma(meant)) = map.measure;
+            let is_it =
+                map.column == name || map.column == format!("{name}_{}", meant.column_suffix());
+            let measure = match map.measure {
+                Measure::Reading(_) => Measure::Reading(stated),
+                Measure::Sigma(_) => Measure::Sigma(stated),
+            };
+            let is_other = meant != stated && meant.quantity() == stated.quantity();
+            (is_it && is_other).then(|| ColumnMap {
+                measure,
+                ..map.clone()
             })
         })
     }

@@ -1,4 +1,5 @@
-//! Whether everything that the files end with is refused: the newest readings are missing then, and nothing else shows it.
+//! What is missing at the files' ends, and nothing else shows: where everything that they end with is refused, and where a header that comes
+//! again has no column of a benchmark any more.
 
 use crate::runtime::ingest::Item;
 use crate::runtime::tail::LinesRead;
@@ -16,10 +17,11 @@ struct RefusedEnd {
     count: u64,
 }
 
-/// By source the rows.
+/// By source the rows, and the columns that are gone.
 #[derive(Debug, Default)]
 pub(super) struct RefusedEnds {
     rows: BTreeMap<String, RefusedEnd>,
+    gone: Vec<String>,
 }
 
 impl RefusedEnds {
@@ -46,6 +48,9 @@ impl RefusedEnds {
                 });
             end.count += 1;
         }
+        let gone = fed.remarks.iter().filter(|remark| remark.is_loss);
+        let gone = gone.map(|remark| format!("source {source:?}: {file}: {remark}"));
+        self.gone.extend(gone);
     }
 
     /// A line for each.
@@ -55,6 +60,6 @@ impl RefusedEnds {
             let RefusedEnd { at, why, count } = end;
             format!("source {source:?}: from {at} on all rows are refused ({count} of them), the first: {why}")
         });
-        rows.collect()
+        rows.chain(self.gone.iter().cloned()).collect()
     }
 }

@@ -120,6 +120,7 @@ impl PreviewSoFar {
                 unwatched: BTreeSet::new(),
                 missing: BTreeMap::new(),
                 unread: BTreeMap::new(),
+                unreadable: None,
             },
             files: Vec::new(),
             refused: RefusedKinds::default(),
@@ -140,7 +141,7 @@ impl PreviewSoFar {
             Err(error) => {
                 let folder = source.pattern.folder().display();
                 let problem = format!("cannot list {folder}: {error}");
-                so_far.view.remarks.push(problem);
+                so_far.view.cannot_be_read(problem);
                 self.sources.push(so_far);
                 return;
             }
@@ -158,7 +159,9 @@ impl PreviewSoFar {
                 }
                 SourceKind::Csv | SourceKind::Ndjson | SourceKind::Toa5 => {
                     let looked = self.text(number, decoder, &mut so_far);
-                    so_far.view.remarks.extend(looked.err());
+                    if let Err(problem) = looked {
+                        so_far.view.cannot_be_read(problem);
+                    }
                 }
             }
         }
@@ -235,7 +238,8 @@ impl PreviewSoFar {
                 "{file}: its last line has no line break, and is read once it has one"
             ));
         }
-        keep_layout(view, file, meanings);
+        let meant = |(name, meaning)| (name, decoder.meant(meaning));
+        keep_layout(view, file, meanings.into_iter().map(meant).collect());
         Ok(())
     }
 

@@ -73,6 +73,11 @@ fn why(view: &SourceView, benchmark: Option<&BenchmarkId>, config: &Config) -> S
         || format!("source {id:?}"),
         |benchmark| format!("benchmark {:?}", benchmark.as_str()),
     );
+    if let Some(problem) = &view.unreadable {
+        return format!(
+            "{whose}: there is no reading of it: {problem}; the daemon's user must be able to read the folder and the files"
+        );
+    }
     if view.files == 0 {
         return format!("{whose}: there is no file {path}; is the path right?");
     }

@@ -21,7 +21,8 @@ pub struct Preview {
     pub unwatched: BTreeSet<BenchmarkId>,
     /// What no file feeds.
     pub unfed: Vec<Unfed>,
-    /// What the files end with and the daemon refuses, a line each: these are among the warnings.
+    /// What the files end with and the daemon refuses, and columns of benchmarks that a later header has no more, a line each: these are
+    /// among the warnings.
     #[serde(skip)]
     pub refused_ends: Vec<String>,
     /// Covariates that the config states and no file has: these are among the warnings.
@@ -59,6 +60,17 @@ pub struct SourceView {
     /// Of these, how many are no mark, and cannot be used for what stands there.
     #[serde(skip)]
     pub(super) unread: BTreeMap<BenchmarkId, u64>,
+    /// Why the first of its folder and files cannot be read that cannot.
+    #[serde(skip)]
+    pub(super) unreadable: Option<String>,
+}
+
+impl SourceView {
+    /// Takes a problem of the folder or of a file, which is a remark too.
+    pub(super) fn cannot_be_read(&mut self, problem: String) {
+        self.unreadable.get_or_insert_with(|| problem.clone());
+        self.remarks.push(problem);
+    }
 }
 
 /// The columns of one file or of several.

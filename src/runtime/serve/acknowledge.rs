@@ -157,7 +157,7 @@ fn page_of(page: &LinkPage, zone: &TimeZone) -> PageAnswer {
         LinkPage::Forged => {
             let text = "It was cut short or changed on the way, or comes from elsewhere.";
             let text = format!("<p>{text} {UNCHANGED}</p>");
-            (StatusCode::FORBIDDEN, "This is no link of ours", text)
+            (StatusCode::FORBIDDEN, "This link is not valid", text)
         }
         LinkPage::Foreign => {
             let text = format!("<p>The state here knows no such alert. {UNCHANGED}</p>");

@@ -269,7 +269,7 @@ fn benchmarks(sheet: &mut Sheet<'_>, points: &[(BenchmarkId, VitalsPoint)]) -> f
         ),
         (
             "unknown",
-            "1 while the monitor cannot decide: no data, a sensor fault, a stale model",
+            "1 while nothing can be said of the benchmark: no readings, or readings or a sensor at fault",
             |point| Some(f64::from(u8::from(point.is_unknown))),
         ),
         (

@@ -4,8 +4,8 @@ use crate::config::{Benchmark, Broker, FileSource, SourceKind};
 use crate::monitor::{Input, Measured};
 use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Timestamp, Unit};
 use crate::runtime::ingest::{
-    ColumnMap, Item, Measure, ReadOptions, Remark, TextFormat, TextRows, VectorMap, unit_in_name,
-    unpacked_name,
+    ColumnMap, Item, Meaning, Measure, ReadOptions, Remark, TextFormat, TextRows, VectorMap,
+    unit_in_name, unpacked_name,
 };
 use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
@@ -239,6 +239,22 @@ impl Decoder {
                 ))
             })
         })
+    }
+
+    /// What a column is taken for: a second quantity of a benchmark is not read.
+    pub(in crate::runtime) fn meant(&self, meaning: Meaning) -> Meaning {
+        let is_left_out = if let Meaning::Reading { benchmark, unit } = &meaning {
+            let unit = Unit::parse(unit).ok();
+            self.wanted(benchmark).is_some()
+                && unit.is_some_and(|unit| !self.wants(benchmark, unit))
+        } else {
+            false
+        };
+        if is_left_out {
+            Meaning::Unused
+        } else {
+            meaning
+        }
     }
 
     fn wants(&self, benchmark: &BenchmarkId, unit: Unit) -> bool {

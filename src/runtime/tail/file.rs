@@ -366,7 +366,12 @@ impl FileTail {
     fn take(&mut self, fed: LinesRead) {
         for remark in fed.remarks {
             if self.decoder.is_news(&remark) {
-                tracing::info!(file = %self.path.display(), "{remark}");
+                let file = self.path.display();
+                if remark.is_loss {
+                    tracing::warn!(%file, "{remark}");
+                } else {
+                    tracing::info!(%file, "{remark}");
+                }
             }
         }
         for (_, item) in fed.items {

@@ -46,7 +46,7 @@ pub struct TimeWindow {
 pub struct ViewColumns {
     /// Seconds since 1970.
     pub t: Vec<f64>,
-    /// Values.
+    /// Values: of readings mm or mm/day, of velocities mm/day, of a covariate in its `unit`.
     pub v: Vec<f64>,
 }
 

@@ -90,7 +90,8 @@ impl DataQuality {
             }
             None => newly_in_other_unit(history, unit),
         };
-        self.other_unit = found.filter(|other| !history.is_reset_since(other.before()));
+        self.other_unit = found
+            .filter(|other| !(other.may_be_a_reset() && history.is_reset_since(other.before())));
     }
 
     /// Whether the newest reading came while its time lay ahead of the clock, which said `clock`.
@@ -158,12 +159,15 @@ fn has_moved(history: &History, unit: Unit, name: &str) -> bool {
 
 fn newly_in_other_unit(history: &History, unit: Unit) -> Option<OtherUnit> {
     let quantity = unit.quantity();
-    let newest = history.with_resets(unit, other_unit::looked_at(quantity));
-    if !other_unit::may_have_changed(&newest) {
-        return None;
-    }
     let readings = history.with_resets(unit, other_unit::gone_by(quantity));
-    let found = OtherUnit::at_end(&readings, quantity)?;
+    let newest = &readings[readings
+        .len()
+        .saturating_sub(other_unit::looked_at(quantity))..];
+    let may_have = other_unit::may_have_changed(newest);
+    let jumped = may_have
+        .then(|| OtherUnit::at_end(&readings, quantity))
+        .flatten();
+    let found = jumped.or_else(|| OtherUnit::quiet_since(&readings, quantity))?;
     Some(found.given_in(unit.factor()))
 }
 
