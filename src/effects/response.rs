@@ -23,6 +23,9 @@ pub(super) struct Driver {
     gaps: Vec<(f64, f64)>,
 }
 
+const DAYS_OF_A_YEAR: f64 = 365.25;
+/// Fewer years say less of what is usual at a date than the mean of all does.
+const FEWEST_YEARS: usize = 2;
 /// The covariate's values are kept on this many points at most.
 const MOST_VALUES: usize = 8192;
 
@@ -203,16 +206,17 @@ impl Driver {
         let mut level = self.values.clone();
         // What one stage gives is linear between its values, whatever it was given.
         let mut is_total = self.is_total;
-        let mut settled = self.settled();
+        let mut settled = None;
         for _ in 0..response.stages {
             if response.form == Form::Rate && response.mean_days < 0.5 * self.step {
                 break;
             }
             let mean = response.mean_days / f64::from(response.stages);
             if mean >= SHORTEST * self.step {
-                filter(&mut level, self.step, (mean, settled), is_total);
+                let from = settled.unwrap_or_else(|| self.settled(mean));
+                filter(&mut level, self.step, (mean, from), is_total);
                 is_total = false;
-                settled = level[0];
+                settled = Some(level[0]);
             }
         }
         if response.form == Form::Rate {
@@ -221,11 +225,28 @@ impl Driver {
         self.read(&level, nodes, is_total)
     }
 
-    /// To what a response has settled before the first value: of what comes and goes its mean, else that value.
-    fn settled(&self) -> f64 {
+    /// To what a response of mean `mean` days has settled before the first value: of what comes and goes to its mean, or, where there are years of
+    /// it, to what it is at that date of the others; else to that value.
+    fn settled(&self, mean: f64) -> f64 {
         match self.kind {
             CovariateKind::Rain | CovariateKind::Flow => {
-                self.values.iter().sum::<f64>() / self.values.len() as f64
+                let usual = self.values.iter().sum::<f64>() / self.values.len() as f64;
+                let mut level = self.values.clone();
+                filter(&mut level, self.step, (mean, usual), self.is_total);
+                let place = |year: f64| {
+                    let place = (year * DAYS_OF_A_YEAR / self.step).round();
+                    #[expect(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "a number of steps"
+                    )]
+                    level.get(place as usize).copied()
+                };
+                let others: Vec<f64> = (1..).map(f64::from).map_while(place).collect();
+                if others.len() < FEWEST_YEARS {
+                    return usual;
+                }
+                others.iter().sum::<f64>() / others.len() as f64
             }
             CovariateKind::Level
             | CovariateKind::Temperature

@@ -350,7 +350,7 @@ impl Search<'_> {
             || StepErrors::is_a_figure(self.problem, before);
         if is_judged && (!ratio.is_finite() || ratio > most_extrapolated(one.term.kind)) {
             let reason = if ratio <= RUNS_AWAY {
-                format!("the held-out error grows to {} %", figure(100.0 * ratio, 4))
+                format!("the held-out error grows to {} %", figure(100.0 * ratio, 1))
             } else {
                 "with it the held-out error is over a thousand times as large".to_owned()
             };

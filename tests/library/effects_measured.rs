@@ -494,7 +494,7 @@ fn the_step_of_prism_40_1938_follows_the_rain() {
     let said = explained(&recording, Some("40-1938"));
     assert_eq!(said.verdict.effect, Kind::HYDROLOGICAL);
     assert_eq!(said.verdict.channel.as_deref(), Some("rain_mm"));
-    assert!(said.error.fit.after.unwrap() < 0.2 * said.error.fit.before.unwrap());
+    assert!(said.error.fit.after.unwrap() < 4.5);
 }
 
 #[test]
