@@ -330,7 +330,8 @@ fn column_unit(section: &Section<'_>, column: &Placed<String>) -> Option<Unit> {
 fn benchmark_source(section: &mut Section<'_>, known: &[&str]) -> Option<String> {
     match (section.text("source"), known) {
         (None, [only]) => Some((*only).to_owned()),
-        (None, []) => None,
+        // Where none is understood, that is the problem.
+        (_, []) => None,
         (None, _) => {
             section.error(
                 section.at(),

@@ -43,10 +43,14 @@ pub(super) fn vector(section: &mut Section<'_>, unit: Option<Unit>) -> Option<Ve
     let counts = (components.value.len(), direction.value.len());
     if counts.0 != counts.1 || !(1..=3).contains(&counts.0) || !(length > 0.0 && length.is_finite())
     {
-        let what = format!(
-            "benchmark.direction is no direction: {} numbers for {} components",
-            counts.1, counts.0
-        );
+        let what = if counts.0 == counts.1 && (1..=3).contains(&counts.0) {
+            "benchmark.direction is no direction: its length is 0, or no number".to_owned()
+        } else {
+            format!(
+                "benchmark.direction is no direction: {} numbers for {} components",
+                counts.1, counts.0
+            )
+        };
         section.error(&direction.at, what, format!("write {EXAMPLE}"));
         return None;
     }

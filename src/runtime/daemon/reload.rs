@@ -40,11 +40,17 @@ impl Daemon {
     fn fresh_config(&self) -> Result<(Config, Option<Token>), String> {
         let mut fresh = config::load(&self.config.file).map_err(|error| error.to_string())?;
         fresh.wall_in_hooks(Path::new(OURSELVES));
-        if fresh.site.state_dir != self.config.site.state_dir
-            || fresh.site.listen != self.config.site.listen
-            || fresh.site.name != self.config.site.name
-        {
-            return Err("another state_dir, listen or site name needs a restart".to_owned());
+        let (there, here) = (&fresh.site, &self.config.site);
+        let changed = [
+            ("state_dir", there.state_dir != here.state_dir),
+            ("listen", there.listen != here.listen),
+            ("name", there.name != here.name),
+        ];
+        if let Some((key, _)) = changed.iter().find(|(_, is_other)| *is_other) {
+            return Err(format!(
+                "{}: site.{key} is another than the daemon was started with: it needs a restart",
+                self.config.file.display()
+            ));
         }
         let token = fresh.site.token().map_err(|error| error.to_string())?;
         Ok((fresh, token))

@@ -72,7 +72,7 @@ pub enum IngestError {
         line: u64,
     },
     /// A piece of a line that is no JSON object.
-    #[error("{}, line {line}: found {found:?}, expected one JSON object on each line", file.display())]
+    #[error("{}, line {line}: found {}, expected one JSON object on each line", file.display(), beginning(found))]
     Torn {
         /// The file.
         file: PathBuf,
@@ -116,7 +116,7 @@ pub enum IngestError {
         expected: usize,
     },
     /// A cell holds what cannot stand there.
-    #[error("{}, line {line}, column {column:?}: found {value:?}, expected {expected}", file.display())]
+    #[error("{}, line {line}, column {column:?}: found {}, expected {expected}", file.display(), beginning(value))]
     Field {
         /// The file.
         file: PathBuf,
@@ -219,6 +219,15 @@ pub enum IngestError {
     /// Files that cannot be joined.
     #[error(transparent)]
     Merge(#[from] MergeError),
+}
+
+/// As much of a value as a person reads.
+fn beginning(value: &str) -> String {
+    const SHOWN: usize = 60;
+    match value.char_indices().nth(SHOWN) {
+        Some((end, _)) => format!("{:?} and more", &value[..end]),
+        None => format!("{value:?}"),
+    }
 }
 
 impl IngestError {
