@@ -116,8 +116,11 @@ impl OtherUnit {
             .map(span)
             .fold(f64::INFINITY, f64::min);
         let ratio = quietest / span(after);
+        if !ratio.is_finite() || ratio < OF_LENGTHS[0] / RANGES_ALIKE {
+            return None;
+        }
         let steps: Vec<f64> = before.windows(2).map(|two| two[1].1 - two[0].1).collect();
-        let (_, scatter) = scatter_of(&steps).filter(|_| ratio.is_finite())?;
+        let (_, scatter) = scatter_of(&steps)?;
         let (last, first) = (*before.last()?, *after.first()?);
         let mean = after.iter().map(|one| one.1).sum::<f64>() / QUIET as f64;
         let is_clear = last.1.abs() >= CLEAR_OF_ZERO * scatter;
@@ -272,16 +275,15 @@ pub fn standing(readings: &[(Timestamp, f64)], quantity: Quantity) -> Option<Oth
     let mut change: Option<OtherUnit> = None;
     for end in 1..=readings.len() {
         let so_far = &readings[..end];
-        change = match change.filter(OtherUnit::is_confirmed) {
-            Some(mut stands) => stands.goes_on(readings[end - 1].1).then_some(stands),
-            None => {
-                let newest = &so_far[end.saturating_sub(gone_by(quantity))..];
-                let may_have = may_have_changed(&so_far[end.saturating_sub(looked_at(quantity))..]);
-                let jumped = may_have
-                    .then(|| OtherUnit::at_end(newest, quantity))
-                    .flatten();
-                jumped.or_else(|| OtherUnit::quiet_since(newest, quantity))
-            }
+        change = if let Some(mut stands) = change.filter(OtherUnit::is_confirmed) {
+            stands.goes_on(readings[end - 1].1).then_some(stands)
+        } else {
+            let newest = &so_far[end.saturating_sub(gone_by(quantity))..];
+            let may_have = may_have_changed(&so_far[end.saturating_sub(looked_at(quantity))..]);
+            let jumped = may_have
+                .then(|| OtherUnit::at_end(newest, quantity))
+                .flatten();
+            jumped.or_else(|| OtherUnit::quiet_since(newest, quantity))
         };
     }
     change
