@@ -1,6 +1,7 @@
 //! What a covariate does to the slope after a while: its exponential or gamma response, by level or by rate.
 
 use super::act::standardise;
+use super::definition::YEAR;
 use super::kind::Form;
 use crate::reading::{Channel, CovariateKind, RunningTotal, Timestamp, days_since};
 
@@ -23,7 +24,6 @@ pub(super) struct Driver {
     gaps: Vec<(f64, f64)>,
 }
 
-const DAYS_OF_A_YEAR: f64 = 365.25;
 /// Fewer years say less of what is usual at a date than the mean of all does.
 const FEWEST_YEARS: usize = 2;
 /// The covariate's values are kept on this many points at most.
@@ -231,22 +231,23 @@ impl Driver {
         match self.kind {
             CovariateKind::Rain | CovariateKind::Flow => {
                 let usual = self.values.iter().sum::<f64>() / self.values.len() as f64;
-                let mut level = self.values.clone();
-                filter(&mut level, self.step, (mean, usual), self.is_total);
-                let place = |year: f64| {
-                    let place = (year * DAYS_OF_A_YEAR / self.step).round();
-                    #[expect(
-                        clippy::cast_possible_truncation,
-                        clippy::cast_sign_loss,
-                        reason = "a number of steps"
-                    )]
-                    level.get(place as usize).copied()
-                };
-                let others: Vec<f64> = (1..).map(f64::from).map_while(place).collect();
-                if others.len() < FEWEST_YEARS {
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a number of steps"
+                )]
+                let place = |year: f64| (year * YEAR / self.step).round() as usize;
+                let places = (1..).map(f64::from).map(place);
+                let places: Vec<usize> = places
+                    .take_while(|place| *place < self.values.len())
+                    .collect();
+                if places.len() < FEWEST_YEARS {
                     return usual;
                 }
-                others.iter().sum::<f64>() / others.len() as f64
+                let mut level = self.values.clone();
+                filter(&mut level, self.step, (mean, usual), self.is_total);
+                let others = places.iter().map(|place| level[*place]);
+                others.sum::<f64>() / places.len() as f64
             }
             CovariateKind::Level
             | CovariateKind::Temperature

@@ -71,18 +71,18 @@ fn confirming(quantity: Quantity) -> usize {
     }
 }
 
-/// How many of the newest readings can show a change: where `may_have_changed` is false for them, there is none.
-pub fn looked_at(quantity: Quantity) -> usize {
+/// How many of the newest readings can show a change by their values: where `may_have_changed` is false for them, none does.
+fn looked_at(quantity: Quantity) -> usize {
     confirming(quantity) + 1
 }
 
-/// How many of the newest readings [`OtherUnit::at_end`] goes by.
+/// How many of the newest readings [`OtherUnit::newly`] goes by.
 pub fn gone_by(quantity: Quantity) -> usize {
     INSPECTED + confirming(quantity).max(QUIET)
 }
 
 /// Whether two of these readings in a row may be in different units, as far as it can be known without sorting any.
-pub fn may_have_changed(newest: &[(Timestamp, f64)]) -> bool {
+fn may_have_changed(newest: &[(Timestamp, f64)]) -> bool {
     newest.windows(2).any(|pair| {
         let (one, other) = (pair[0].1.abs(), pair[1].1.abs());
         let (low, high) = if one < other {
@@ -95,8 +95,17 @@ pub fn may_have_changed(newest: &[(Timestamp, f64)]) -> bool {
 }
 
 impl OtherUnit {
+    /// The change that the newest [`gone_by`] of `readings`, in order of time, show, by their values or by how little they scatter.
+    pub fn newly(readings: &[(Timestamp, f64)], quantity: Quantity) -> Option<Self> {
+        let newest = |count: usize| &readings[readings.len().saturating_sub(count)..];
+        let all = newest(gone_by(quantity));
+        let may_have = may_have_changed(newest(looked_at(quantity)));
+        let jumped = may_have.then(|| Self::at_end(all, quantity)).flatten();
+        jumped.or_else(|| Self::quiet_since(all, quantity))
+    }
+
     /// The change that the newest of `readings`, in order of time, show: those after it are no more than it takes to confirm it.
-    pub fn at_end(readings: &[(Timestamp, f64)], quantity: Quantity) -> Option<Self> {
+    fn at_end(readings: &[(Timestamp, f64)], quantity: Quantity) -> Option<Self> {
         (1..=confirming(quantity)).find_map(|count| {
             let at = readings.len().checked_sub(count)?;
             Self::between(&readings[..at], &readings[at..], quantity)
@@ -104,7 +113,7 @@ impl OtherUnit {
     }
 
     /// The change to a larger unit that the newest of `readings`, in order of time, show by how little they scatter: displacements near zero.
-    pub fn quiet_since(readings: &[(Timestamp, f64)], quantity: Quantity) -> Option<Self> {
+    fn quiet_since(readings: &[(Timestamp, f64)], quantity: Quantity) -> Option<Self> {
         let at = readings.len().checked_sub(QUIET)?;
         let (before, after) = readings.split_at(at);
         let before = &before[before.len().saturating_sub(INSPECTED)..];
@@ -278,12 +287,7 @@ pub fn standing(readings: &[(Timestamp, f64)], quantity: Quantity) -> Option<Oth
         change = if let Some(mut stands) = change.filter(OtherUnit::is_confirmed) {
             stands.goes_on(readings[end - 1].1).then_some(stands)
         } else {
-            let newest = &so_far[end.saturating_sub(gone_by(quantity))..];
-            let may_have = may_have_changed(&so_far[end.saturating_sub(looked_at(quantity))..]);
-            let jumped = may_have
-                .then(|| OtherUnit::at_end(newest, quantity))
-                .flatten();
-            jumped.or_else(|| OtherUnit::quiet_since(newest, quantity))
+            OtherUnit::newly(so_far, quantity)
         };
     }
     change

@@ -240,7 +240,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
         sources,
         benchmarks: benchmarks.into_values().collect(),
         averaging: args.file.averaging.map(in_words),
-        evacuation_time: args.evacuation_time.map(in_whole_units),
+        evacuation_time: args.evacuation_time.map(in_words),
         hook: args.hook.clone(),
     })
 }
@@ -267,18 +267,6 @@ fn planned(
         day_zero,
         is_beside: false,
     })
-}
-
-/// `12h`, `90min` or `45s`: in the longest of these units that makes a whole number.
-fn in_whole_units(span: SignedDuration) -> String {
-    let seconds = span.as_secs();
-    if seconds % 3600 == 0 {
-        format!("{}h", seconds / 3600)
-    } else if seconds % 60 == 0 {
-        format!("{}min", seconds / 60)
-    } else {
-        format!("{seconds}s")
-    }
 }
 
 /// `1h` of an hour.

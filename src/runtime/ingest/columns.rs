@@ -116,27 +116,25 @@ fn like_a_reading(name: &str) -> Option<Remark> {
     let unit = unit.and_then(|unit| Unit::parse(unit).ok());
     let unit = unit.filter(|unit| unit.quantity().name() == quantity);
     let unit = unit.map_or_else(|| "UNIT".to_owned(), Unit::column_suffix);
-    Some(Remark {
-        is_loss: false,
-        about: format!("column {name:?}"),
-        text: format!(
+    Some(Remark::new(
+        format!("column {name:?}"),
+        format!(
             "named like a reading, and taken as a covariate; expected [ID_]displacement_UNIT with um, mm, cm, m, in or ft, \
              or [ID_]velocity_UNIT with one of these per min, h, day or yr (what is in another unit must be converted first); \
              or say it with [[benchmark]] column = {name:?} and unit (--column {name:?}=ID:{quantity}:{unit})"
         ),
-    })
+    ))
 }
 
 /// That a column's readings are taken in the unit that is stated of their benchmark.
 fn in_stated_unit(name: &str, named: Unit, benchmark: &BenchmarkId, unit: Unit) -> Remark {
-    Remark {
-        is_loss: false,
-        about: format!("column {name:?}"),
-        text: format!(
+    Remark::new(
+        format!("column {name:?}"),
+        format!(
             "it is named as one in {named}, and taken in {unit}, as unit of [[benchmark]] {:?} says: is that right?",
             benchmark.as_str()
         ),
-    }
+    )
 }
 
 /// What a column of readings should have.

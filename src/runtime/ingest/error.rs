@@ -236,11 +236,10 @@ impl IngestError {
         let Self::NoTopics { topics, .. } = self else {
             return None;
         };
-        Some(Remark {
-            is_loss: false,
-            about: "left out".to_owned(),
-            text: format!("it has no readings, but topics {topics:?}"),
-        })
+        Some(Remark::new(
+            "left out".to_owned(),
+            format!("it has no readings, but topics {topics:?}"),
+        ))
     }
 
     /// Whether the system failed us, rather than the data being bad.

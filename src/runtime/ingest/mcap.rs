@@ -238,13 +238,12 @@ impl<'a> Contents<'a> {
     fn no_end(&self) -> Option<Remark> {
         let newest = self.newest.filter(|_| self.has_no_end)?;
         let messages = self.messages;
-        Some(Remark {
-            is_loss: false,
-            about: "has not ended".to_owned(),
-            text: format!(
+        Some(Remark::new(
+            "has not ended".to_owned(),
+            format!(
                 "it is still being written, or was cut off; read up to message {messages}, the last value taken being that of {newest}"
             ),
-        })
+        ))
     }
 }
 

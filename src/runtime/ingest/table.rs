@@ -111,13 +111,10 @@ impl TableRows {
         } else {
             "if it is a covariate's mark for no value, add it to missing (--missing)"
         };
-        Remark {
-            is_loss: false,
-            about: format!("column {:?}", self.layout.names[index]),
-            text: format!(
-                "found {shown:?}, which is no number: no covariate, and not used; {cure}"
-            ),
-        }
+        Remark::new(
+            format!("column {:?}", self.layout.names[index]),
+            format!("found {shown:?}, which is no number: no covariate, and not used; {cure}"),
+        )
     }
 
     /// What of the last row could not be used.

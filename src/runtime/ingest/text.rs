@@ -15,24 +15,29 @@ use std::fmt;
 use std::path::Path;
 
 impl Remark {
+    /// One by which no reading is missing.
+    pub(super) fn new(about: String, text: String) -> Self {
+        Self {
+            about,
+            text,
+            is_loss: false,
+        }
+    }
+
     /// That a table is taken as Latin-1 from this line on.
     pub fn latin1(line: u64) -> Self {
-        Self {
-            is_loss: false,
-            about: "encoding".to_owned(),
-            text: format!(
-                "line {line} is not in UTF-8: such lines are taken as Latin-1 (ISO 8859-1)"
-            ),
-        }
+        Self::new(
+            "encoding".to_owned(),
+            format!("line {line} is not in UTF-8: such lines are taken as Latin-1 (ISO 8859-1)"),
+        )
     }
 
     /// That a file is in UTF-16.
     pub fn utf16() -> Self {
-        Self {
-            is_loss: false,
-            about: "encoding".to_owned(),
-            text: "the file is in UTF-16, as its first bytes say, and is read as such".to_owned(),
-        }
+        Self::new(
+            "encoding".to_owned(),
+            "the file is in UTF-16, as its first bytes say, and is read as such".to_owned(),
+        )
     }
 }
 

@@ -236,13 +236,9 @@ impl Toa5Rows {
         self.options.columns.iter().filter_map(|map| {
             let named = self.units_line.get(&map.column)?;
             let (Measure::Reading(unit) | Measure::Sigma(unit)) = map.measure;
-            Some(Remark {
-                is_loss: false,
-                about: format!("column {:?}", map.column),
-                text: format!(
+            Some(Remark::new(format!("column {:?}", map.column), format!(
                     "the units line has {named:?} for it, which is no unit that can be read, and it is taken in {unit}: is that right?"
-                ),
-            })
+                )))
         })
     }
 

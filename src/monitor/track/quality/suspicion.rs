@@ -160,14 +160,7 @@ fn has_moved(history: &History, unit: Unit, name: &str) -> bool {
 fn newly_in_other_unit(history: &History, unit: Unit) -> Option<OtherUnit> {
     let quantity = unit.quantity();
     let readings = history.with_resets(unit, other_unit::gone_by(quantity));
-    let newest = &readings[readings
-        .len()
-        .saturating_sub(other_unit::looked_at(quantity))..];
-    let may_have = other_unit::may_have_changed(newest);
-    let jumped = may_have
-        .then(|| OtherUnit::at_end(&readings, quantity))
-        .flatten();
-    let found = jumped.or_else(|| OtherUnit::quiet_since(&readings, quantity))?;
+    let found = OtherUnit::newly(&readings, quantity)?;
     Some(found.given_in(unit.factor()))
 }
 
