@@ -62,7 +62,7 @@ pub(crate) fn mcap(bytes: &[u8]) {
         let (body, next) = after.split_at(usize::try_from(length).expect("it fits the file"));
         rest = next;
         let messages = opcode.map(|opcode| channels.decode(opcode, body));
-        for message in messages.into_iter().flatten().flatten() {
+        for message in messages.into_iter().flatten().flatten().flatten() {
             let payload = &message.payload;
             let decoded = decode_message(
                 &message.topic,

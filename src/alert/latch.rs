@@ -248,7 +248,7 @@ impl Latch {
             || is_past_its_peak
             || self.first_velocity <= 0.0
             || call.level == Level::Green;
-        let steady = less && is_over && velocity < policy.critical_velocity_mm_per_day;
+        let steady = less && is_over && !pauses && velocity < policy.critical_velocity_mm_per_day;
         let motion = (velocity, error);
         self.slow = SteadyStretch::go_on(self.slow, slowed.into(), evidence.now, motion);
         self.steady = SteadyStretch::go_on(self.steady, steady.into(), evidence.now, motion);

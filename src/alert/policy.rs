@@ -62,15 +62,15 @@ const ODDS_AT_ONCE: f64 = 4.0;
 const NEAR_ODDS: f64 = 1.0 / 7.0;
 /// Red was in force of late within so many of the times that a slope must be steady. Slopes pause for 2 to 10 days before they collapse.
 const OF_LATE: i32 = 2;
-/// The next reading is taken to be no further away than so many of the spans that are counted from it.
-const MOST_INTERVALS: i32 = 2;
+/// The next reading is taken to be no further away than this.
+const FARTHEST_READING: SignedDuration = SignedDuration::from_hours(30 * 24);
 
 /// `span`, counted from the next reading of those that are `interval_days` apart: what this one does not call, that one may,
 /// and people act then.
 pub fn to_the_next_reading(span: SignedDuration, interval_days: f64) -> SignedDuration {
     let interval = SignedDuration::try_from_secs_f64(interval_days * SECONDS_PER_DAY);
-    let most = span.saturating_mul(MOST_INTERVALS);
-    span.saturating_add(interval.unwrap_or(most).min(most))
+    let interval = interval.unwrap_or(FARTHEST_READING);
+    span.saturating_add(interval.min(FARTHEST_READING))
 }
 
 /// The chance whose odds are so many times those of `chance`.

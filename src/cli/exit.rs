@@ -29,7 +29,7 @@ const CONFIG: u8 = 78;
 
 /// What the process of another user ended with; it has said why.
 #[derive(Debug, thiserror::Error)]
-#[error("so it is for user {0}")]
+#[error("checked as user {0}")]
 pub(super) struct AsUser(pub(super) String, pub(super) Option<u8>);
 
 /// A command line that parses and is invalid.

@@ -100,7 +100,7 @@ fn test(args: &Test) -> anyhow::Result<()> {
         OutputFormat::Json => LogFormat::Json,
     });
     let mut config = config::load(&args.config)?;
-    config.wall_in_hooks(Path::new(OURSELVES));
+    config.sandbox_hooks(Path::new(OURSELVES));
     let now = clock::now();
     let asked: Vec<(&HookConfig, Level)> = config
         .hooks

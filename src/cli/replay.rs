@@ -68,7 +68,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let mut config = args.config.as_deref().map(config::load).transpose()?;
     if let Some(config) = &mut config {
-        config.wall_in_hooks(Path::new(OURSELVES));
+        config.sandbox_hooks(Path::new(OURSELVES));
     }
     for warning in config.iter().flat_map(|config| &config.warnings) {
         exit::complain(warning);

@@ -31,7 +31,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         OutputFormat::Json => LogFormat::Json,
     }));
     let mut config = config::load(&args.config)?;
-    config.wall_in_hooks(Path::new(OURSELVES));
+    config.sandbox_hooks(Path::new(OURSELVES));
     for warning in &config.warnings {
         tracing::warn!(%warning, "doubtful config");
     }

@@ -24,8 +24,19 @@ pub(super) struct SiteArgs {
 }
 
 impl SiteArgs {
+    /// Its config and its state. The daemon goes on with the config before while the file is wrong, and so does who asks it.
     pub(super) fn open(&self) -> anyhow::Result<(Config, Store)> {
-        let config = config::load(&self.config)?;
+        let config = match config::load(&self.config) {
+            Err(refused) => {
+                let config = config::load_as_far_as_right(&self.config).map_err(|_| refused)?;
+                let (file, state) = (self.config.display(), config.site.state_dir.display());
+                tracing::warn!(
+                    "{file} has errors, which slipwatch check lists; the state in {state} is used"
+                );
+                config
+            }
+            Ok(config) => config,
+        };
         let folder = &config.site.state_dir;
         let store = Store::look(folder)
             .with_context(|| format!("cannot read the state in {}", folder.display()))?;

@@ -324,8 +324,8 @@ fn slow_sampling(config: &Config) -> impl Iterator<Item = String> {
 }
 
 impl Config {
-    /// Has the hooks walled in by `program`, which must be this one, but for those that ask not to be.
-    pub fn wall_in_hooks(&mut self, program: &Path) {
+    /// Has the hooks run in a sandbox by `program`, which must be this one, but for those that ask not to be.
+    pub fn sandbox_hooks(&mut self, program: &Path) {
         for hook in self.hooks.iter_mut().filter(|hook| hook.sandbox) {
             hook.launcher = Some(program.to_owned());
         }

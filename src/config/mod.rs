@@ -276,6 +276,22 @@ pub fn load(file: &Path) -> Result<Config, ConfigError> {
     parse(&text, file)
 }
 
+/// The site file at `file` as far as it is right, where it says which state is meant: who gives an order, or looks, need not mend it first.
+///
+/// # Errors
+/// [`ConfigError`] as of [`load`], where nothing can be made of it.
+pub fn load_as_far_as_right(file: &Path) -> Result<Config, ConfigError> {
+    let refused = match load(file) {
+        Err(refused @ ConfigError::Invalid { .. }) => refused,
+        other => return other,
+    };
+    let text = read(file).unwrap_or_default();
+    let (config, _) = taken(&text, file);
+    config
+        .filter(|config| config.site.state_dir.is_dir())
+        .ok_or(refused)
+}
+
 /// The text of the file; `-` is stdin, which is read once.
 fn read(file: &Path) -> io::Result<String> {
     static STDIN: OnceLock<Result<String, io::ErrorKind>> = OnceLock::new();

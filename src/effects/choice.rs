@@ -312,11 +312,11 @@ impl Search<'_> {
 fn with_other_delays_beside(refitted: Vec<Refitted>) -> Vec<Refitted> {
     let mut ordered: Vec<Refitted> = Vec::with_capacity(refitted.len());
     for one in refitted {
-        let beside = ordered.iter().position(|known| {
+        let beside = ordered.iter().rposition(|known| {
             let is_of_a_covariate = one.term.channel.is_some();
             is_of_a_covariate && known.is_as(&one)
         });
-        let place = beside.map_or(ordered.len(), |first| first + 1);
+        let place = beside.map_or(ordered.len(), |last| last + 1);
         ordered.insert(place, one);
     }
     ordered

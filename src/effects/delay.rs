@@ -11,7 +11,7 @@ use super::refit::{Fitted, Start, jacobian, likeliest, plain_starts, refit, towa
 use super::response::Driver;
 use super::search::{Refitted, Search};
 use super::term::Term;
-use super::trials::Trial;
+use super::trials::{Trial, TrialBase};
 
 /// So many that promise most about a steady law are refitted too.
 const ABOUT_STEADY: usize = 3;
@@ -23,9 +23,8 @@ const PROMISES: f64 = 1.0;
 impl Search<'_> {
     /// The best responses about a law at a steady rate, of those that `known` has another response of: where the covariate is what
     /// bends the readings, the law fitted without it is bent the same way. None beside effects that are in the law.
-    pub(super) fn about_a_steady_law(&mut self, base: &Fitted, known: &[Trial]) -> Vec<Trial> {
-        let steady = self.steady_law(base);
-        let Some(ground) = steady.as_ref().and_then(|law| self.ground(law)) else {
+    pub(super) fn about_a_steady_law(steady: Option<&TrialBase>, known: &[Trial]) -> Vec<Trial> {
+        let Some(ground) = steady else {
             return Vec::new();
         };
         let is_known = |trial: &Trial| {
@@ -47,6 +46,7 @@ impl Search<'_> {
     pub(super) fn with_a_step_about_a_steady_law(
         &mut self,
         base: &Fitted,
+        steady: Option<&TrialBase>,
         others: &mut Vec<Refitted>,
     ) {
         let events = others
@@ -56,7 +56,7 @@ impl Search<'_> {
         if most >= BY_SHAPE * self.options.bic_margin {
             return;
         }
-        let Some(trial) = self.step_about_a_steady_law(base) else {
+        let Some(trial) = steady.and_then(step_about_a_steady_law) else {
             return;
         };
         let known = (others.iter()).position(|one| one.term.kind == trial.term.kind);
@@ -73,23 +73,8 @@ impl Search<'_> {
         }
     }
 
-    /// A step of the load where it explains most about a steady law: about a plain law that has bent towards it, it explains more elsewhere.
-    /// `None` where it gains nothing, or where `base` has effects.
-    fn step_about_a_steady_law(&mut self, base: &Fitted) -> Option<Trial> {
-        let steady = self.steady_law(base)?;
-        let ground = self.ground(&steady)?;
-        let mut kinds = ground.effects.iter().map(|definition| Kind::of(definition));
-        let is_step = |act: &Act| matches!(act, Act::Step);
-        let kind = kinds.find(|kind| kind.definition().once().iter().any(is_step))?;
-        let times = ground.event_times().into_iter();
-        let steps = times.flat_map(|at| once(kind, at));
-        let each = steps.map(|term| ground.trial(term));
-        let best = each.max_by(|a, b| a.gain.total_cmp(&b.gain));
-        best.filter(|best| best.gain > 0.0)
-    }
-
     /// The steady law nearest to the readings; `None` where `base` has effects.
-    fn steady_law(&mut self, base: &Fitted) -> Option<Fitted> {
+    pub(super) fn steady_law(&mut self, base: &Fitted) -> Option<Fitted> {
         let start = plain_starts(self.problem).into_iter().next();
         let start = start.filter(|_| base.terms.is_empty())?;
         let white = Whitener::new(self.problem, Noise::WHITE);
@@ -145,6 +130,19 @@ impl Search<'_> {
         self.sharpen(&mut fitted);
         self.known(base, fitted)
     }
+}
+
+/// A step of the load where it explains most about a steady law, of which that is the ground: about a plain law that has bent towards it, it
+/// explains more elsewhere. `None` where it gains nothing.
+fn step_about_a_steady_law(ground: &TrialBase) -> Option<Trial> {
+    let mut kinds = ground.effects.iter().map(|definition| Kind::of(definition));
+    let is_step = |act: &Act| matches!(act, Act::Step);
+    let kind = kinds.find(|kind| kind.definition().once().iter().any(is_step))?;
+    let times = ground.event_times().into_iter();
+    let steps = times.flat_map(|at| once(kind, at));
+    let each = steps.map(|term| ground.trial(term));
+    let best = each.max_by(|a, b| a.gain.total_cmp(&b.gain));
+    best.filter(|best| best.gain > 0.0)
 }
 
 #[cfg(test)]

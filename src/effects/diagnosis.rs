@@ -5,7 +5,7 @@ use super::noise::{Memory, Whitener};
 use super::problem::Problem;
 use super::refit::{Fitted, jacobian};
 use super::term::Scratch;
-use crate::reading::Quantity;
+use crate::reading::{NORMAL_MEDIAN, Quantity};
 use statrs::function::erf::erfc;
 use statrs::function::gamma::checked_gamma_ur;
 
@@ -13,8 +13,6 @@ use statrs::function::gamma::checked_gamma_ur;
 const CLEAR: f64 = 3.0;
 /// The newest innovations that are looked at together, at most.
 const NEWEST: usize = 3;
-/// Half of all normal numbers are smaller than so many standard deviations.
-const NORMAL_MEDIAN: f64 = 0.6745;
 /// A resolution of more than so many standard deviations is coarse.
 const COARSE: f64 = 1.0;
 /// Lags of the autocorrelation.

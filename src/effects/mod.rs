@@ -20,6 +20,7 @@ mod faults;
 mod findings;
 mod forms;
 mod frame;
+mod free_delay;
 mod fresh;
 mod gain_interval;
 mod given;
@@ -75,13 +76,14 @@ pub use explanation::{
     Candidate, Change, Curves, DeclaredEffect, Effect, ErrorChange, Explained, Explanation, Fault,
     ForecastChange, NoiseReport, ResidualTests, SettingsReport, Structure,
 };
-pub use faults::{Inspected, inspect};
+pub use faults::{Inspected, inspect, is_code};
 pub use given::{Cause, error_given};
 pub use kind::{FaultKind, Form, Kind};
 pub use known::EFFECTS;
 pub use known_load::{Filtered, KnownLoad, Part, Wave};
 pub use options::Options;
 pub use partition::{Partition, partition, partition_candidate};
+pub use response::MOST_SAMPLES;
 pub use rival::Rival;
 pub use together::{Together, explain_together};
 pub use watch::{Residual, residual_structure};

@@ -4,7 +4,9 @@ use super::faults::resolution;
 use super::quantiles::upper_median;
 use super::weights::{local_misfits, unit_median, weights};
 use crate::fit::Observations;
-use crate::reading::{Channel, Quantity, SECONDS_PER_DAY, Series, Timestamp, days_since};
+use crate::reading::{
+    Channel, NORMAL_MEDIAN, Quantity, SECONDS_PER_DAY, Series, Timestamp, days_since,
+};
 
 /// More readings than this are averaged in blocks.
 pub(super) const MOST_READINGS: usize = 3000;
@@ -73,7 +75,7 @@ impl Problem {
             sigma.is_none() && weight.iter().any(|one| one.to_bits() != 1.0_f64.to_bits());
         let relative = misfits.iter().zip(&weight).map(|(m, w)| (m / w).abs());
         let rounding = rounding(series, &y);
-        let scatter = (upper_median(relative.collect()) / 0.6745).max(rounding);
+        let scatter = (upper_median(relative.collect()) / NORMAL_MEDIAN).max(rounding);
         let fine = channels
             .iter()
             .filter_map(channel_spacing)

@@ -1,5 +1,7 @@
 //! Medians and quantiles of values that are finite numbers.
 
+use crate::reading;
+
 /// The middle of `values`; 0 where there are none.
 pub(super) fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
@@ -34,11 +36,7 @@ pub(super) fn robust_deviation(values: &[f64]) -> f64 {
 
 /// The middle value, of an even number the upper one of both; 0 of none.
 pub(super) fn upper_median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    reading::upper_median(&mut values).unwrap_or(0.0)
 }
 
 #[cfg(test)]

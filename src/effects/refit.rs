@@ -108,6 +108,9 @@ impl Start {
     }
 }
 
+/// Which of [`plain_starts`] answers to a load at once.
+pub(super) const AT_ONCE: usize = 1;
+
 /// Starts of the law alone: steady, steady and answering to a load at once, accelerating, relaxing from above and from below, soon there, and there within the first readings.
 pub(super) fn plain_starts(problem: &Problem) -> Vec<Start> {
     let shapes = [
@@ -232,9 +235,10 @@ pub(super) fn towards(
     whitener: &Whitener,
     (steps, scratch): (usize, &mut Scratch),
 ) -> Option<Fitted> {
-    let point = ParameterPoint::at(problem, &start.terms, start.parameters.clone(), scratch)?;
+    let terms = &start.terms;
+    let point = ParameterPoint::at(problem, terms, start.parameters.clone(), scratch)?;
     let there = point.descend(problem, start, whitener, (steps, scratch));
-    Some(there.fitted(problem, &start.terms, whitener))
+    Some(there.fitted(problem, terms, whitener))
 }
 
 /// A start at `fitted` under the noise that makes its residual likeliest.
@@ -489,11 +493,6 @@ fn solve(normal: &DMatrix<f64>, slope: &DVector<f64>, damping: f64) -> Option<DV
     let step = damped.cholesky()?.solve(slope);
     // No parameter moves by more than its own order at once.
     let most = step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
-    step.iter().all(|s| s.is_finite()).then(|| {
-        if most > 1e6 {
-            step * (1e6 / most)
-        } else {
-            step
-        }
-    })
+    let within = (1e6 / most).min(1.0);
+    step.iter().all(|s| s.is_finite()).then(|| step * within)
 }

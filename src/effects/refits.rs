@@ -3,12 +3,13 @@
 use super::act::Act;
 use super::candidates;
 use super::frame::Frames;
+use super::free_delay::SHORTEST;
 use super::fresh::{best_of_starts, fresh_laws, from_the_first_readings, under_growing_means};
 use super::linear::Linear;
 use super::noise::{Noise, Whitener};
 use super::problem::Problem;
 use super::refit::{Fitted, Start, jacobian, likeliest, refit, under_likeliest};
-use super::response::{Driver, Response};
+use super::response::Driver;
 use super::search::{DeclaredPart, Refitted, SIGNIFICANT, Search};
 use super::surrogate::{Innovations, NullGains};
 use super::term::Term;
@@ -34,9 +35,6 @@ enum Stride {
     /// This share of the time between two readings.
     Within(f64),
 }
-
-/// The shortest delay that is tried, spacings of the covariate; none becomes this when it is moved.
-const SHORTEST: f64 = 0.3;
 
 const STRIDES: [Stride; 4] = [
     Stride::Coarse,
@@ -105,12 +103,14 @@ impl<'a> Search<'a> {
     pub(super) fn refits(&mut self, base: &Fitted, round: usize) -> Option<Vec<Refitted>> {
         let ground = self.ground(base)?;
         let (count, seed) = (self.options.surrogates, self.seed_of(round));
-        let covariates = self.through_covariates(base, &ground);
+        let steady = self.steady_law(base);
+        let steady = steady.as_ref().and_then(|law| self.ground(law));
+        let covariates = self.through_covariates(base, &ground, steady.as_ref());
         let (others, tried) = ground.of_itself();
         let mut best = best_of_each_kind(others);
         best.truncate(MOST_OTHERS);
         let mut others = self.refit_each(base, best);
-        self.with_a_step_about_a_steady_law(base, &mut others);
+        self.with_a_step_about_a_steady_law(base, steady.as_ref(), &mut others);
         self.events_at_one_time(base, &mut others);
         // Only what passes the margin is judged by it.
         let of_noise = |kind| ground.null_gains_of_noise(&tried, kind, count, seed + 1);
@@ -152,23 +152,26 @@ impl<'a> Search<'a> {
         Some(all)
     }
 
-    /// The best of each covariate, refitted.
+    /// The best of each covariate, refitted; `steady` is the ground about a steady law.
     pub(super) fn through_covariates(
         &mut self,
         base: &Fitted,
         ground: &TrialBase,
+        steady: Option<&TrialBase>,
     ) -> Vec<Refitted> {
         let mut covariates = ground.of_covariates();
         covariates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         covariates.truncate(MOST_COVARIATES);
-        let steady = self.about_a_steady_law(base, &covariates);
+        let steady = Self::about_a_steady_law(steady, &covariates);
         covariates.extend(steady);
         let mut covariates = self.refit_each(base, covariates);
         let again = covariates.iter();
         let again = again.filter_map(|one| self.with_another_delay(base, one));
         let again: Vec<Refitted> = again.collect();
         covariates.extend(again);
-        best_of_each_response(covariates, self.options.bic_margin)
+        let mut best = best_of_each_response(covariates, self.options.bic_margin);
+        self.with_free_delays_beside(base, &mut best);
+        best
     }
 
     /// The kinds of what happens once are compared at one time: where the best of them was found, each other one is tried
@@ -373,30 +376,18 @@ impl<'a> Search<'a> {
         if term.at.is_some() {
             return self.at_another_time(term, stride, later);
         }
-        let response = term.response?;
-        let driver = Driver::at(self.drivers, term.channel)?;
-        let factor = match stride {
+        let mean_days = term.response?.mean_days;
+        let factor: f64 = match stride {
             Stride::Coarse => 1.6,
             Stride::Fine => 1.25,
             Stride::Within(_) => return None,
         };
-        let factor: f64 = if later { factor } else { 1.0 / factor };
-        let shortest = SHORTEST * driver.step();
-        let mean_days = if response.mean_days > 0.0 {
-            response.mean_days * factor
-        } else if later {
-            shortest
-        } else {
-            return None;
-        };
-        let response = Response {
-            mean_days,
-            ..response
-        };
-        if response.memory_days() > 0.5 * self.problem.span() || response.mean_days < shortest {
-            return None;
+        let factor = if later { factor } else { 1.0 / factor };
+        if mean_days > 0.0 {
+            return self.with_mean_delay(term, mean_days * factor);
         }
-        candidates::with_response(self.problem, term, driver, response)
+        let driver = Driver::at(self.drivers, term.channel)?;
+        later.then(|| self.with_mean_delay(term, SHORTEST * driver.step()))?
     }
 
     fn at_another_time(&self, term: &Term, stride: Stride, later: bool) -> Option<Term> {

@@ -26,12 +26,19 @@ pub(super) struct Driver {
 
 /// Fewer years say less of what is usual at a date than the mean of all does.
 const FEWEST_YEARS: usize = 2;
-/// The covariate's values are kept on this many points at most.
-const MOST_VALUES: usize = 8192;
+/// A covariate's values are kept on this many points at most, and of one that is followed live no more samples.
+pub const MOST_SAMPLES: usize = 8192;
 
 /// Samples this many times as far apart as they usually are have others missing between them.
 const GAP: f64 = 8.0;
 const HALF: f64 = 0.5;
+
+/// A gauge that reports only while it rains: fewest spells without a value, their least share of the values, the largest share of values that
+/// are zero, and from how many spacings on a spell is dry.
+const FEWEST_SPELLS: usize = 8;
+const SPELLS: f64 = 0.02;
+const ZEROS: f64 = 0.02;
+const DRY: f64 = 1.5;
 
 /// This share of a step is rounding.
 const ROUNDING: f64 = 1e-6;
@@ -82,11 +89,17 @@ impl Driver {
         let (span, start) = (last.0 - first.0, first.0);
         let apart = samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
         let spacing =
-            super::quantiles::upper_median(apart.collect()).max(span / (MOST_VALUES - 1) as f64);
+            super::quantiles::upper_median(apart.collect()).max(span / (MOST_SAMPLES - 1) as f64);
         let count = (span / spacing).round().max(3.0);
         let step = span / count;
-        let gaps = gaps(&samples, spacing);
+        let mut gaps = gaps(&samples, spacing);
         let is_total = channel.kind() == CovariateKind::Rain;
+        let samples = if is_total && comes_only_when_it_rains(&samples, gaps.len()) {
+            gaps.clear();
+            with_dry_spells(samples, spacing)
+        } else {
+            samples
+        };
         let values = if is_total {
             amounts(samples, (spacing, &gaps), (step, count))
         } else {
@@ -301,6 +314,29 @@ fn gaps(samples: &[(f64, f64)], spacing: f64) -> Vec<(f64, f64)> {
     long.collect()
 }
 
+/// Whether a gauge reports only while it rains: it hardly ever reports nothing, and often not at all.
+fn comes_only_when_it_rains(samples: &[(f64, f64)], gaps: usize) -> bool {
+    let values = || samples.iter().map(|(_, value)| *value);
+    let count = samples.len() as f64;
+    let zeros = values().filter(|value| *value == 0.0).count();
+    let is_often = gaps >= FEWEST_SPELLS && gaps as f64 > SPELLS * count;
+    let total = RunningTotal::of(&values().collect::<Vec<f64>>());
+    is_often && (zeros as f64) < ZEROS * count && total.is_none()
+}
+
+/// Nothing falls between samples further apart than usual, but for the step before the later one.
+fn with_dry_spells(samples: Vec<(f64, f64)>, spacing: f64) -> Vec<(f64, f64)> {
+    let mut all: Vec<(f64, f64)> = Vec::with_capacity(2 * samples.len());
+    for (t, value) in samples {
+        let before = all.last().map(|last| last.0);
+        if before.is_some_and(|before| t - before > DRY * spacing) {
+            all.push((t - spacing, 0.0));
+        }
+        all.push((t, value));
+    }
+    all
+}
+
 /// The amount of each of `count` steps from the first sample on, of amounts that came since the sample before each, or of their running
 /// total; what came before the first sample is not known of a total, and counts as what usually comes.
 fn amounts(
@@ -360,8 +396,9 @@ fn filled(samples: Vec<(f64, f64)>, spacing: f64, gaps: &[(f64, f64)]) -> Vec<(f
     let span = samples[samples.len() - 1].0 - samples[0].0;
     let usual = known / (span - missing).max(spacing);
     let mut all = Vec::with_capacity(samples.len() + gaps.len());
+    let mut gaps = gaps.iter().peekable();
     for (until, value) in samples {
-        let gap = gaps.iter().find(|gap| gap.1.total_cmp(&until).is_eq());
+        let gap = gaps.next_if(|gap| gap.1.total_cmp(&until).is_eq());
         if let Some((from, _)) = gap.filter(|gap| value < HALF * usual * (until - gap.0)) {
             let last = until - spacing;
             all.push((last, usual * (last - from)));

@@ -84,8 +84,10 @@ impl Search<'_> {
             is_daily: false,
             null: None,
         };
+        let steady = other.steady_law(base);
+        let steady = steady.as_ref().and_then(|law| other.ground(law));
         let ground = other.ground(base);
-        let found = ground.map(|ground| other.through_covariates(base, &ground));
+        let found = ground.map(|ground| other.through_covariates(base, &ground, steady.as_ref()));
         self.scratch = other.scratch;
         let found = found.unwrap_or_default().into_iter();
         let may_be = found.filter(|one| objection(self.problem, &one.fitted, &shifted).is_none());

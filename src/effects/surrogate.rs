@@ -9,6 +9,7 @@ use super::problem::Problem;
 use super::quantiles::upper_median;
 use super::response::Driver;
 use super::term::Term;
+use crate::reading::NORMAL_MEDIAN;
 use nalgebra::DMatrix;
 use rand::RngExt as _;
 use rand::SeedableRng as _;
@@ -30,7 +31,6 @@ pub(super) struct NullGains {
 
 /// An innovation of noise is no larger than so many standard deviations, which are taken from the median size.
 const LARGEST: f64 = 4.0;
-const NORMAL_MEDIAN: f64 = 0.6745;
 
 /// Directions that are multiplied at once with all series of noise: a product of matrices reads each of them from the
 /// memory once for many products.

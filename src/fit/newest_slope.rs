@@ -1,6 +1,7 @@
 //! How fast a slope may run by the prior, in units of its newest sampling interval: one rule for every posterior of the law.
 
 use super::rates::Rate;
+use crate::reading::upper_median;
 
 /// Standard deviation of the prior on r times the newest sampling interval: what would be over well within one rests on one
 /// reading.
@@ -13,9 +14,7 @@ const NEWEST: usize = 4;
 pub(super) fn newest_interval_days(rates: &[Rate]) -> Option<f64> {
     let newest = &rates[rates.len().saturating_sub(NEWEST)..];
     let spacings = newest.windows(2).map(|pair| pair[1].to - pair[0].to);
-    let mut spacings: Vec<f64> = spacings.collect();
-    spacings.sort_by(f64::total_cmp);
-    spacings.get(spacings.len() / 2).copied()
+    upper_median(&mut spacings.collect::<Vec<f64>>())
 }
 
 #[cfg(test)]

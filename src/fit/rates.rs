@@ -3,7 +3,7 @@
 //! Displacement differences over short intervals are noise; intervals are merged, newest first,
 //! until the slip in them stands clear of it, so that slow creep and fast sliding are both resolved.
 
-use crate::reading::{Quantity, SECONDS_PER_DAY, Series, days_since};
+use crate::reading::{NORMAL_MEDIAN, Quantity, SECONDS_PER_DAY, Series, days_since, upper_median};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -266,11 +266,9 @@ fn misfit(w: &[Observation]) -> f64 {
     (w[1].value - line).abs() / size
 }
 
-/// The standard deviation of normal variables of these sizes, of which there is at least one.
+/// The standard deviation of normal variables of these sizes; of none no number.
 fn of_median(sizes: &mut [f64]) -> f64 {
-    let middle = sizes.len() / 2;
-    // The median of |normal| is 0.6745 of its standard deviation.
-    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745
+    upper_median(sizes).unwrap_or(f64::NAN) / NORMAL_MEDIAN
 }
 
 /// Readings that are one: their mean, and how far it may be off.

@@ -38,6 +38,15 @@ const SLOWED: f64 = 0.5;
 /// ratio. Set on simulated slopes: storms, thaws and fits of stick-slip repeat, and a collapse is mostly faster than all
 /// before it.
 const SURVIVED: i32 = 2;
+/// A slope of which it is all but sure that it accelerates, but for this chance, is half as much the less likely to collapse for either: its
+/// first burst is a part of this crisis. Set on drawn shapes of failure under measured noise: of 72, four more were red a day before, and of as
+/// many that stand no more.
+const ALL_BUT_SURE: f64 = 0.01;
+/// Spans before the one whose chance also counts within them, the power of time with which it grows, and how far readings are apart, days,
+/// where it does not count and where it does in full. Of 13,864 looks at drawn slopes read each week, the log score fell by a seventh.
+const FIRST_SPANS: usize = 2;
+const TO_COME: f64 = 1.5;
+const FAR_APART_DAYS: (f64, f64) = (1.0, 7.0);
 /// A slope at this velocity, mm/day, or under it, is the less likely to collapse within a span: the slowest of 30 slopes that collapsed was
 /// last read at .475 mm/day (Federico et al. 2012).
 const SLOW: f64 = 0.25;
@@ -196,9 +205,13 @@ impl Indicators {
             let creeps = (1.0 - accelerating) * (1.0 - may_grow(&self.scales, (power, days)));
             let chance = network.chance(&self.inputs(members, power, days)) * (1.0 - creeps);
             reached = reached.max(chance);
-            sure = sure.max(self.most(days) * chance * goes_on(&self.scales, power));
+            let goes_on = goes_on(&self.scales, power, accelerating);
+            sure = sure.max(self.most(days) * chance * goes_on);
             all.push((days, reached));
             counted.push((days, sure));
+        }
+        for chances in [&mut all, &mut counted] {
+            between_far_readings(chances);
         }
         let centred = self.scales.centred_before_days;
         (all, passage(&counted, &members.law, centred))
@@ -264,14 +277,30 @@ fn newest(observations: &Observations, days: f64) -> Option<Observations> {
 }
 
 /// The share of the chance within the span of scale `power` that is left to a slope that has slowed: since the span, and
-/// since it was fastest.
-fn goes_on(scales: &Scales, power: usize) -> f64 {
+/// since it was fastest, as far as it is not sure that it accelerates.
+fn goes_on(scales: &Scales, power: usize, accelerating: f64) -> f64 {
     let view = View::at(scales, power);
     let scale = view.scale(0);
     let highest = ln_above(scale.highest_velocity, error(scale));
     let since = view.ln_velocity(-view.span) - view.ln_velocity(0);
     let ever = view.ln_velocity(0) - highest;
-    (since.exp() / SLOWED).min(1.0) * ever.exp().min(1.0).powi(SURVIVED) * is_fast(scales, power)
+    let has_slowed = (since.exp() / SLOWED).min(1.0) * ever.exp().min(1.0).powi(SURVIVED);
+    let unsure = (1.0 - accelerating) / (1.0 - accelerating + ALL_BUT_SURE);
+    has_slowed.powf(unsure) * is_fast(scales, power)
+}
+
+/// The chances within the first spans no less than a hazard that grows as time to the power [`TO_COME`] has them, where readings are days
+/// apart: what taught the network ended at least one interval after its last look, and slopes do not wait for the next reading.
+fn between_far_readings(chances: &mut [(f64, f64)]) {
+    let Some((days, chance)) = chances.get(FIRST_SPANS).copied() else {
+        return;
+    };
+    let (near, far) = FAR_APART_DAYS;
+    let counts = ((chances[0].0 - near) / (far - near)).clamp(0.0, 1.0);
+    for own in &mut chances[..FIRST_SPANS] {
+        let share = (own.0 / days).powf(TO_COME);
+        own.1 = own.1.max(counts * (1.0 - (1.0 - chance).powf(share)));
+    }
 }
 
 /// The share of the chance within the span of scale `power` that is left to a slope for its velocity, the highest now of that scale and the shorter

@@ -6,7 +6,7 @@
 //! acceleration began within the newest block is proportional to the block's length, so that looking often does not
 //! cost: at a scale of D days one independent look is made in D days, each passes odds of c by chance with probability
 //! at most (prior rate) D / c (Markov), and all of them together pass it at most (prior rate) / c times a year, however
-//! often the slope is looked at in between. Summed over the scales the prior rate is at most [`RATE_PER_YEAR`].
+//! often the slope is looked at in between. Summed over the scales, sixteen of a record of years read by the hour, the prior rate is at most 4.8 a year.
 
 use super::Scales;
 use super::scales::{Scale, VelocityChange};
@@ -14,8 +14,6 @@ use crate::fit::Observations;
 
 /// Prior rate of accelerations, a year, at one scale.
 const RATE_OF_A_SCALE: f64 = 0.3;
-/// The sum over [`Scales`] of a record of years read by the hour: sixteen scales.
-pub const RATE_PER_YEAR: f64 = 16.0 * RATE_OF_A_SCALE;
 /// How much wider changes are while a slope accelerates.
 const SPREAD: f64 = 8.0;
 /// One reading, ln, can add no more than this: the chance of a reading gone wrong is not smaller.

@@ -21,7 +21,6 @@ mod together;
 
 pub use collapse::{Collapse, Indicators};
 pub use dependence::Dependence;
-pub use evidence::RATE_PER_YEAR;
 pub use line::InverseVelocityLine;
 pub use members::Members;
 pub use network::{INPUTS, Network, UNITS};

@@ -1,13 +1,14 @@
 //! Events in a record after which the slope slowed down by far more than it usually does: a slide that stopped, a reset, a few wrong
 //! readings.
 
+use crate::reading::{NORMAL_MEDIAN, upper_median};
+
 /// A change is never known better than this, mm.
 pub(super) const LEAST_CHANGE_MM: f64 = 1e-4;
 /// Fewest changes among which one may stand out, how many standard deviations it does, taken from the median size, and the most
 /// events that are not usual yet.
 const FEWEST_CHANGES: usize = 32;
 const OUTSTANDING: f64 = 10.0;
-const NORMAL_MEDIAN: f64 = 0.6745;
 const MOST_EVENTS: usize = 2;
 /// What lies within so many blocks, or this share of the record, is one event; and an event stands out that is so many times the
 /// largest that is usual.
@@ -94,10 +95,9 @@ fn largest_events(slow: &[SlowDown], apart: usize) -> [f64; MOST_EVENTS + 1] {
     largest
 }
 
-/// The upper one of the two middle ones of an even number; `values` are not empty.
+/// The upper one of the two middle ones of an even number; of no values no number.
 pub(super) fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    upper_median(values).unwrap_or(f64::NAN)
 }
 
 /// When, and by how much at most, mm, the slope slowed down within [`ONE_EVENT`] blocks up to `block`: a slope that is read often takes several of

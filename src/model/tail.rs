@@ -71,7 +71,8 @@ fn integrate_down(law: &Law, span: (f64, f64), integrand: impl Fn(f64) -> f64) -
             from - pole
         };
         let least = (4.0 * f64::EPSILON * from).max(f64::MIN_POSITIVE);
-        let to = (from + clearance.clamp(least, smoothest.max(0.5 * from).min(6.0))).min(end);
+        let to =
+            (from + clearance.clamp(least, smoothest.max(0.5 * from).min(6.0).max(least))).min(end);
         // Kahan's summation: a time to failure is asked to its last digits just before it.
         let term = panel(&integrand, from, to) - lost;
         let next = sum + term;

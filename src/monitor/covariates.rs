@@ -1,11 +1,10 @@
 //! The covariates of a site as the searches and the laws under known loads see them, bounded by count.
 
-use crate::reading::{Channel, CovariateKind, Sample, Timestamp};
+use crate::effects::{MOST_SAMPLES, is_code};
+use crate::reading::{Channel, CovariateKind, RunningTotal, Sample, Timestamp};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Samples kept of one channel.
-const MOST_SAMPLES: usize = 4096;
 /// Channels kept; a site that names more has a column for each of something else.
 const MOST_CHANNELS: usize = 64;
 
@@ -43,7 +42,7 @@ impl Covariates {
             Some(_) | None => samples.insert(at, sample),
         }
         if samples.len() > MOST_SAMPLES {
-            thin(samples);
+            thin(channel);
         }
     }
 
@@ -76,21 +75,49 @@ impl Covariates {
     }
 }
 
-/// Makes one of every two samples of the older half: their mean, so that no rain is lost.
-fn thin(samples: &mut Vec<Sample>) {
-    let older = samples.len() / 4 * 2;
-    let mean = |pair: &[Sample]| {
-        let [earlier, later] = pair else {
-            return pair[0];
-        };
-        let half = later.time.duration_since(earlier.time) / 2;
-        Sample {
-            time: earlier.time.checked_add(half).unwrap_or(later.time),
-            value: f64::midpoint(earlier.value, later.value),
-        }
+/// Makes one of all samples within each part of the time, of which half as many as may be kept at most lie in the record: of amounts, as of
+/// rain, their sum, which came until the last of them; of a running total that last one; of all else the mean, a logger's code left out where
+/// there is more. Evenly over the whole record, or the older ones would seem to be far apart; and a power of two of seconds long, or they would
+/// be once more parts have been made of parts.
+fn thin(channel: &mut Channel) {
+    let Some((first, last)) = channel.samples.first().zip(channel.samples.last()) else {
+        return;
     };
-    let merged: Vec<Sample> = samples[..older].chunks(2).map(mean).collect();
-    samples.splice(..older, merged);
+    let span = last.time.duration_since(first.time).as_secs_f64();
+    let part = (span / (MOST_SAMPLES / 2) as f64).log2().ceil().exp2();
+    let start = Timestamp::UNIX_EPOCH;
+    let place = |sample: &Sample| (sample.time.duration_since(start).as_secs_f64() / part).floor();
+    let is_same = |one: &Sample, next: &Sample| place(one).total_cmp(&place(next)).is_eq();
+    let parts = channel.samples.chunk_by(is_same);
+    let values: Vec<f64> = channel.samples.iter().map(|one| one.value).collect();
+    let is_rain = channel.kind() == CovariateKind::Rain;
+    let is_running = is_rain && RunningTotal::of(&values).is_some();
+    let merged = parts.filter_map(|part| {
+        let (first, last) = (part.first()?, part.last()?);
+        if is_running {
+            return Some(*last);
+        }
+        let measured = part
+            .iter()
+            .map(|one| one.value)
+            .filter(|one| !is_code(*one));
+        let (count, sum) = measured.fold((0.0, 0.0), |(n, sum), one| (n + 1.0, sum + one));
+        if count == 0.0 {
+            return Some(*last);
+        }
+        if is_rain {
+            return Some(Sample {
+                value: sum,
+                ..*last
+            });
+        }
+        let half = last.time.duration_since(first.time) / 2;
+        Some(Sample {
+            time: first.time.checked_add(half).unwrap_or(last.time),
+            value: sum / count,
+        })
+    });
+    channel.samples = merged.collect();
 }
 
 #[cfg(test)]
@@ -104,19 +131,65 @@ mod tests {
         }
     }
 
-    #[test]
-    fn ever_so_many_samples_stay_bounded_and_keep_their_mean_and_their_newest() {
+    /// Ten years of hourly values of a channel of that name.
+    fn ten_years(name: &str, value: impl Fn(i64) -> f64) -> Channel {
         let mut covariates = Covariates::default();
-        for second in 0..20_000 {
-            let value = f64::from(u8::from(second % 2 == 0));
-            covariates.take(("rain_mm", Some("mm")), None, sample(second, value));
+        for hour in 0..87_660 {
+            covariates.take((name, Some("mm")), None, sample(3600 * hour, value(hour)));
         }
-        let channel = covariates.list()[0];
-        assert!(channel.samples.len() <= MOST_SAMPLES);
-        assert_eq!(channel.samples.last(), Some(&sample(19_999, 0.0)));
-        let first = channel.samples[0];
-        assert!((first.value - 0.5).abs() < 0.01, "{first:?}");
-        assert!(channel.samples.windows(2).all(|w| w[0].time < w[1].time));
+        covariates.list()[0].clone()
+    }
+
+    #[test]
+    fn ten_years_of_hourly_rain_stay_bounded_and_lose_none_of_it() {
+        let showers = |hour: i64| f64::from(u8::from(hour % 31 < 3));
+        let rain = ten_years("rain_mm", showers);
+        let samples = &rain.samples;
+        assert!(samples.len() <= MOST_SAMPLES, "{}", samples.len());
+        let fell: f64 = (0..87_660).map(showers).sum();
+        let kept: f64 = samples.iter().map(|one| one.value).sum();
+        assert!((kept - fell).abs() < 1e-6, "{kept} of {fell}");
+        let earlier = samples
+            .iter()
+            .filter(|one| one.time < sample(3600 * 43_830, 0.0).time);
+        let earlier: f64 = earlier.map(|one| one.value).sum();
+        assert!((earlier / fell - 0.5).abs() < 0.01, "{earlier} of {fell}");
+        // A search, which keeps so many of a whole record, calls eight times as far apart a gap.
+        let even = 87_660.0 * 3600.0 / MOST_SAMPLES as f64;
+        let apart = |pair: &[Sample]| pair[1].time.duration_since(pair[0].time).as_secs_f64();
+        let longest = samples.windows(2).map(apart).fold(0.0, f64::max);
+        assert!(longest < 5.0 * even, "{longest} of {even}");
+    }
+
+    #[test]
+    fn ten_years_of_a_level_keep_their_mean_and_no_code_is_averaged_into_them() {
+        let lake = ten_years("lake_level_m", |hour| {
+            if hour % 1000 == 7 {
+                -9999.0
+            } else {
+                400.0 + f64::from(u8::from(hour % 2 == 0))
+            }
+        });
+        let far = |one: &&Sample| !(399.9..=401.1).contains(&one.value);
+        // A code that stands alone among the newest stays what it is.
+        assert!(
+            lake.samples
+                .iter()
+                .filter(far)
+                .all(|one| is_code(one.value))
+        );
+        assert_eq!(
+            lake.samples.last().unwrap().time,
+            sample(3600 * 87_659, 0.0).time
+        );
+    }
+
+    #[test]
+    fn ten_years_of_a_running_total_stay_one() {
+        let total = ten_years("rain_mm", |hour| (hour % 8766) as f64);
+        let values: Vec<f64> = total.samples.iter().map(|one| one.value).collect();
+        let running = RunningTotal::of(&values).expect("a running total");
+        assert_eq!(running.set_back.len(), 9);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::alert::AlertEvidence;
 use crate::fit::{Observation, Observations, Rate, displacement_sigma, velocity_sigma};
 use crate::forecast::FEWEST_READINGS;
-use crate::reading::{Quantity, Timestamp};
+use crate::reading::{Quantity, Timestamp, upper_median};
 
 /// The line goes through this share of the rates, newest last, and no fewer than [`FEWEST_IN_LINE`].
 const LINE_SHARE: f64 = 0.25;
@@ -19,9 +19,11 @@ const FIRST_ERROR_MM: f64 = 20.0;
 const FIRST_ERRORS: f64 = 6.0;
 /// Before rates are known the velocity is looked for over so many steps.
 const LAST_STEPS: usize = 12;
-/// The coarsest and the finest last decimal place of displacements, mm, and how far, in units of it, what is written in it may lie beside.
-const COARSEST_DIGIT_MM: f64 = 1.0;
-const FINEST_DIGIT_MM: f64 = 0.001;
+/// Last decimal places of displacements, mm, the coarsest first: of metres, centimetres and millimetres, of feet and of inches; and how far, in
+/// units of it, what is written in it may lie beside.
+const DIGITS_MM: [f64; 11] = [
+    10.0, 3.048, 2.54, 1.0, 0.3048, 0.254, 0.1, 0.03048, 0.0254, 0.01, 0.001,
+];
 const NO_DIGIT: f64 = 1e-3;
 /// A settled velocity is a new highest from this factor on.
 const HIGHER: f64 = 1.25;
@@ -48,14 +50,8 @@ pub(super) fn moves_backwards(rates: &[Rate]) -> bool {
 
 /// The median of the latest rates, mm/day.
 pub(super) fn settled(rates: &[Rate]) -> Option<f64> {
-    let mut latest: Vec<f64> = rates
-        .iter()
-        .rev()
-        .take(SETTLED)
-        .map(|rate| rate.velocity)
-        .collect();
-    latest.sort_by(f64::total_cmp);
-    latest.get(latest.len() / 2).copied()
+    let latest = rates.iter().rev().take(SETTLED);
+    upper_median(&mut latest.map(|rate| rate.velocity).collect::<Vec<f64>>())
 }
 
 /// The standard error of the median of the latest rates, mm/day.
@@ -64,8 +60,7 @@ fn settled_error(rates: &[Rate]) -> f64 {
     const OF_THE_MEDIAN: f64 = 1.25;
     let latest = &rates[rates.len().saturating_sub(SETTLED)..];
     let mut errors: Vec<f64> = latest.iter().map(|rate| rate.sigma).collect();
-    errors.sort_by(f64::total_cmp);
-    let error = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
+    let error = upper_median(&mut errors).unwrap_or(0.0);
     OF_THE_MEDIAN * error / (SETTLED as f64).sqrt()
 }
 
@@ -220,20 +215,18 @@ fn newest_velocity(observations: &Observations) -> Option<f64> {
     }
 }
 
-/// The unit of the last decimal place in which displacements are written, mm, at most [`COARSEST_DIGIT_MM`]: no reading is known better.
+/// The unit of the last decimal place in which the newest displacements are written, mm: no reading is known better. They may be written in
+/// millimetres, centimetres, metres, inches or feet.
 fn last_digit_mm(values: &[Observation]) -> f64 {
-    let mut digit = COARSEST_DIGIT_MM;
     let newest = &values[values.len().saturating_sub(SETTLED)..];
-    for value in newest {
-        let is_written_in = |digit: f64| {
+    let is_written_in = |digit: &f64| {
+        newest.iter().all(|value| {
             let units = value.value / digit;
             (units - units.round()).abs() <= NO_DIGIT
-        };
-        while digit > FINEST_DIGIT_MM && !is_written_in(digit) {
-            digit /= 10.0;
-        }
-    }
-    digit
+        })
+    };
+    let coarsest = DIGITS_MM.into_iter().find(is_written_in);
+    coarsest.unwrap_or(DIGITS_MM[DIGITS_MM.len() - 1])
 }
 
 #[cfg(test)]
@@ -253,6 +246,11 @@ mod tests {
         // A millimetre each time is 144 mm/day, of which three quarters are sure after four steps.
         assert!((newest(&[12.0, 13.0, 14.0, 15.0, 16.0]) - 108.0).abs() < 1e-6);
         assert!((newest(&[12.31, 13.31]) - 0.99 * 144.0).abs() < 1e-6);
+        // A hundredth of a foot, a tenth of an inch and a centimetre are no velocity either.
+        for digit in [3.048, 2.54, 10.0] {
+            let step = newest(&[7.0 * digit, 8.0 * digit]);
+            assert!(step.abs() < 1e-9, "{step} of {digit}");
+        }
     }
 
     /// Slips of 6 mm each 12 hours, read by the hour: 12 mm/day.

@@ -124,9 +124,9 @@ impl Monitor {
                 until,
             } => {
                 let track = self.benchmarks.get_mut(benchmark);
-                let event = track.and_then(|track| track.note_waiting(now, *time, *until));
+                let events = track.map(|track| track.note_waiting(now, *time, *until));
                 self.benchmarks.note_changed(benchmark);
-                event.into_iter().collect()
+                events.unwrap_or_default()
             }
             Notice::FirstAhead { benchmark, time } => {
                 let track = self.benchmarks.get_mut(benchmark);
@@ -211,6 +211,12 @@ impl Monitor {
     pub fn is_silent(&self, benchmark: &BenchmarkId) -> bool {
         let track = self.benchmarks.get(benchmark);
         track.is_some_and(Track::is_silent)
+    }
+
+    /// Whether its readings come many together, long after they were measured.
+    pub fn comes_in_batches(&self, benchmark: &BenchmarkId) -> bool {
+        let track = self.benchmarks.get(benchmark);
+        track.is_some_and(Track::comes_in_batches)
     }
 
     /// The benchmarks that are to be judged by `until` although no reading comes.

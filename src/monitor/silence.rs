@@ -17,6 +17,10 @@ const LEARNT_OVER: f64 = 64.0;
 const FEWEST_LEARNT: f64 = 24.0;
 /// So many gaps between bursts of readings make a rhythm.
 const CYCLES: u8 = 4;
+/// So many batches of readings, each so long after the one before, show that they come in batches; and so many readings that come in time, that
+/// they no longer do.
+const BATCHES: usize = 3;
+const IN_TIME: u8 = 6;
 /// A benchmark with a single reading is called silent after this time: it may be one that is read once a week.
 const FIRST: SignedDuration = SignedDuration::from_hours(8 * 24);
 /// No benchmark is called silent within this time.
@@ -40,6 +44,15 @@ pub(super) struct Silence {
     /// What time it was when a reading came that was measured long before.
     #[serde(default)]
     behind: Option<Timestamp>,
+    /// How long after the reading before it the next one came of late, where it had been measured in time.
+    #[serde(default)]
+    delays: VecDeque<SignedDuration>,
+    /// The newest of these, of which it is not known yet when what came was measured.
+    #[serde(default)]
+    delay: Option<SignedDuration>,
+    /// So many came in time since.
+    #[serde(default)]
+    in_time: u8,
 }
 
 impl Silence {
@@ -52,6 +65,7 @@ impl Silence {
             // A silence says little of the usual spacing: after one of months the next would be reported months late. Where
             // the benchmark is read more seldom from now on, a few readings are enough to learn it.
             let spacing = time.duration_since(newest);
+            self.note_delay(spacing);
             self.note_gap(newest, spacing);
             self.note_lost(spacing);
             let most = self
@@ -114,6 +128,41 @@ impl Silence {
     /// What comes now was measured before `time`, which it is by the clock.
     pub(super) fn is_behind(&mut self, time: Timestamp) {
         self.behind = Some(time);
+        self.delay = self.counted_from().map(|from| time.duration_since(from));
+    }
+
+    /// Whether its readings come many together, long after they were measured.
+    pub(super) fn comes_in_batches(&self) -> bool {
+        self.between_batches().is_some()
+    }
+
+    /// Notes whether what had been measured so long after the reading before it came long after that.
+    fn note_delay(&mut self, spacing: SignedDuration) {
+        let usual = self.allowed_in_time();
+        let Some((delay, usual)) = self.delay.take().zip(usual) else {
+            return;
+        };
+        if delay <= usual {
+            self.in_time += 1;
+            if self.in_time >= IN_TIME {
+                self.delays.clear();
+            }
+        } else if spacing <= usual {
+            self.in_time = 0;
+            self.delays.push_back(delay);
+            let old = self.delays.len().saturating_sub(BATCHES);
+            self.delays.drain(..old);
+        }
+    }
+
+    /// For how long it may be silent where its readings come together at even times, as from a logger that is asked once a day.
+    fn between_batches(&self) -> Option<SignedDuration> {
+        let delays = self.delays.iter().map(SignedDuration::as_secs);
+        let longest = delays
+            .clone()
+            .max()
+            .filter(|_| self.delays.len() == BATCHES)?;
+        is_even(delays).then(|| SignedDuration::from_secs(outlasted(longest)).min(FIRST))
     }
 
     /// Whether it is silent.
@@ -231,6 +280,12 @@ impl Silence {
 
     /// For how long it may be silent.
     fn allowed(&self) -> Option<SignedDuration> {
+        let in_time = self.allowed_in_time()?;
+        Some(self.between_batches().unwrap_or(in_time).max(in_time))
+    }
+
+    /// The same where what is measured comes at once.
+    fn allowed_in_time(&self) -> Option<SignedDuration> {
         let longest = self.spacings.iter().max().copied();
         let allowed = match longest {
             None => FIRST,
@@ -330,6 +385,38 @@ mod tests {
             let due = days.deadline().unwrap();
             assert!(at(next + 24.0) < due && due < at(next + 40.0), "{due}");
         }
+    }
+
+    /// Hourly readings that are uploaded each day at noon, and from the tenth day on at once.
+    #[test]
+    fn readings_that_come_together_once_a_day_are_no_silence_once_that_is_known() {
+        let mut silence = Silence::default();
+        let mut silences = Vec::new();
+        let mut upload = |silence: &mut Silence, hours: std::ops::Range<u32>, now: f64| {
+            if silence.deadline().is_some_and(|due| due <= at(now)) {
+                silence.begins();
+                silences.push(now / 24.0);
+            }
+            if silence.is_silent() || silence.comes_in_batches() {
+                silence.is_behind(at(now));
+            }
+            for hour in hours {
+                silence.broken_by(at(f64::from(hour)));
+            }
+        };
+        for day in 1..10 {
+            let until = 24 * day;
+            upload(&mut silence, until - 24..until, f64::from(until));
+        }
+        assert!(silence.comes_in_batches());
+        let due = silence.deadline().unwrap();
+        assert!(at(215.0 + 24.0) < due && due < at(215.0 + 40.0), "{due}");
+        for hour in 216..240 {
+            upload(&mut silence, hour..hour + 1, f64::from(hour));
+        }
+        assert!(!silence.comes_in_batches());
+        assert!(silence.deadline().unwrap() < at(239.0 + 6.0));
+        assert_eq!(silences, [2.0, 3.0, 4.0]);
     }
 
     #[test]

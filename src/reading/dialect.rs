@@ -42,7 +42,8 @@ impl Dialect {
     fn day_after(&self, text: &str, clock: &LocalClock) -> Option<Result<Timestamp, TimeFault>> {
         // Without a zone only a time that states its offset can be read.
         if let Ok(instant) = self.within_day(text, &LocalClock::default()) {
-            return Some(Ok(instant + SignedDuration::from_hours(24)));
+            let after = instant.checked_add(SignedDuration::from_hours(24));
+            return Some(after.map_err(|_| TimeFault::NotATime));
         }
         let anywhere = LocalClock {
             zone: Some(TimeZone::UTC),
@@ -84,7 +85,7 @@ impl Dialect {
         }
     }
 
-    /// The finite number that a cell holds.
+    /// The number that a cell holds, also `inf` and `NaN`: the caller refuses what is not finite.
     pub fn number(&self, cell: &str) -> Option<f64> {
         let plain;
         let cell = match self.thousands {
@@ -495,6 +496,8 @@ mod tests {
             ("%d.%m.%Y %H:%M", "31.12.2017 24:00", "2017-12-31T23:00:00Z"),
             ("rfc3339", "2017-07-06T24:01:00Z", "NotATime"),
             ("rfc3339", "2017-07-06T24:00:01Z", "NotATime"),
+            ("rfc3339", "9999-12-30T24:00:00Z", "NotATime"),
+            ("rfc3339", "9999-12-31T24:00:00+02:00", "NotATime"),
             ("%d.%m.%Y %H:%M", "31.12.2017 24:10", "NotThePattern"),
             ("%d.%m.%Y %H:%M", "24:00", "NotThePattern"),
         ];

@@ -1,7 +1,7 @@
 //! What in a benchmark's readings hardly means what was intended: a wrong unit, a wrong zone, a mark for no value, a
 //! reset that nobody declared.
 
-use super::{Quantity, Timestamp, figure, whole_figure};
+use super::{Quantity, Timestamp, figure, upper_median, whole_figure};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -379,13 +379,7 @@ fn scale(readings: &[(Timestamp, f64)], unit: &str) -> Option<DatedSuspicion> {
 }
 
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return None;
-    }
-    let (_, median, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(*median)
+    upper_median(&mut values.collect::<Vec<f64>>())
 }
 
 #[cfg(test)]

@@ -429,7 +429,7 @@ fn start(hook: &HookConfig, variables: &[(&str, String)], run: &str) -> Result<C
 }
 
 /// What the kernel takes as a variable's value, and any script can print: no control characters, not too long, cut between characters.
-/// Written out they would come to life again: the `echo` of some shells makes a line break of `\n`.
+/// They are not written out as `\n` either: the `echo` of some shells makes a line break of that.
 fn capped(value: &str) -> String {
     let clean = value.replace(char::is_control, " ");
     let mut end = clean.len().min(LONGEST_VALUE);

@@ -7,7 +7,7 @@ use super::vitals::Vitals;
 use crate::config::{SiteConfig, Token, TokenError};
 use std::sync::Arc;
 
-/// Nobody could be let in.
+/// The address at which the daemon is asked cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportingError {
     /// The token that callers are asked for.

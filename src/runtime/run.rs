@@ -35,7 +35,7 @@ pub enum RunError {
         /// What is wrong with it.
         source: StoreError,
     },
-    /// Nobody could be let in to ask.
+    /// The address at which the daemon is asked cannot be used.
     #[error(transparent)]
     Pulse(#[from] ReportingError),
     /// The part that follows the files broke off.

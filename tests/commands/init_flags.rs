@@ -257,3 +257,33 @@ fn lines_before_the_header_are_passed_over_by_init_replay_and_the_daemon_also_af
     drop(daemon);
     assert!(office.log().contains("repeated=42"), "{}", office.log());
 }
+
+/// A logger that begins a file each day, of which the first is there.
+#[test]
+fn what_follows_the_file_of_a_day_is_said_where_its_path_stands_and_is_then_read() {
+    let day = |day: u32| {
+        let row = |hour| format!("2026-11-{day:02}T{hour:02}:00:00Z,{}\n", day * 24 + hour);
+        format!(
+            "time,displacement_mm\n{}",
+            (0..24).map(row).collect::<String>()
+        )
+    };
+    let office = Office::with(&[("logger_2026-11-23.csv", &day(23))]);
+    office.done(&["init", "logger_2026-11-23.csv"]);
+    let config = written(&office);
+    assert!(config.contains("path = \"logger_*.csv\""), "{config}");
+    let followed = config
+        .replace(
+            "path = \"logger_2026-11-23.csv\"",
+            "path = \"logger_*.csv\"",
+        )
+        .replacen(
+            "[[benchmark]]\nid = \"logger_2026-11-23\"",
+            "[[benchmark]]\nid = \"logger\"\ncolumn = \"displacement_mm\"",
+            1,
+        );
+    fs::write(office.path("site.toml"), followed).unwrap();
+    fs::write(office.path("logger_2026-11-24.csv"), day(24)).unwrap();
+    let said = office.done(&["check", "site.toml"]);
+    assert!(said.contains("48 readings of displacement"), "{said}");
+}

@@ -3,7 +3,9 @@
 use assert_cmd::Command;
 use std::path::Path;
 
-const E3: [&str; 3] = ["recordings/preonzo-2012.mcap", "--benchmark", "E3"];
+const PREONZO: &str = "recordings/preonzo-2012.mcap";
+const E3: [&str; 3] = [PREONZO, "--benchmark", "E3"];
+const E2: [&str; 3] = [PREONZO, "--benchmark", "E2"];
 
 fn slipwatch(arguments: &[&str]) -> String {
     let done = Command::new(env!("CARGO_BIN_EXE_slipwatch"))
@@ -15,8 +17,12 @@ fn slipwatch(arguments: &[&str]) -> String {
 }
 
 fn report(folder: &Path, flags: &[&str]) -> String {
+    report_of(&E3, folder, flags)
+}
+
+fn report_of(readings: &[&str], folder: &Path, flags: &[&str]) -> String {
     let to = ["-o", folder.to_str().unwrap()];
-    let said = slipwatch(&[&["report"], &E3[..], flags, &to].concat());
+    let said = slipwatch(&[&["report"], readings, flags, &to].concat());
     let file = folder.join("report.html");
     assert_eq!(said.trim(), file.to_str().unwrap());
     std::fs::read_to_string(file).unwrap()
@@ -25,7 +31,7 @@ fn report(folder: &Path, flags: &[&str]) -> String {
 #[test]
 fn what_is_unlikely_is_not_written_as_impossible() {
     let folder = tempfile::tempdir().unwrap();
-    let page = report(folder.path(), &["--evacuation-time", "1h"]);
+    let page = report_of(&E2, folder.path(), &["--evacuation-time", "1h"]);
     assert!(page.contains("chance &lt; 0.01 within") && !page.contains("chance 0.00"));
 }
 

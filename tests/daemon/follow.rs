@@ -11,7 +11,9 @@ use slipwatch::store::Position;
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{Seek, SeekFrom, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use tempfile::TempDir;
 
 const HEADER: &str = "time,displacement_mm\n";
@@ -170,6 +172,51 @@ fn a_file_that_was_truncated_and_has_grown_past_the_old_end_is_read_again() {
     let longer: String = (2..6).map(|day| row(day, f64::from(day))).collect();
     bench.write("5.csv", &format!("{HEADER}{longer}"));
     assert_eq!(bench.news(), ["possible-gap", "5:2", "5:3", "5:4", "5:5"]);
+}
+
+/// As `rsync --inplace` or a copy over it writes an export, with the rows of some days filled in and the last ones as before.
+#[test]
+fn rows_that_are_filled_in_earlier_in_a_file_are_read_also_after_a_restart() {
+    let rows = |filled: std::ops::Range<u32>| {
+        let row = |day: u32| {
+            let value = if filled.contains(&day) {
+                f64::from(day)
+            } else {
+                0.5
+            };
+            format!("2017-06-{day:02}T00:00:00Z,{value:6.1}{}\n", " ".repeat(30))
+        };
+        (1..29).map(row).collect::<String>()
+    };
+    for is_down in [false, true] {
+        let mut bench = Bench::new("csv");
+        bench.write("5.csv", &format!("{HEADER}{}", rows(1..8)));
+        assert_eq!(bench.news().len(), 28);
+        let place = |bench: &Bench| fs::metadata(bench.path("5.csv")).unwrap();
+        let before = place(&bench);
+        let mut file = OpenOptions::new()
+            .write(true)
+            .open(bench.path("5.csv"))
+            .unwrap();
+        file.write_all(format!("{HEADER}{}", rows(1..16)).as_bytes())
+            .unwrap();
+        // Also where the file system counts time in coarse steps.
+        let later = before.modified().unwrap() + Duration::from_secs(1);
+        file.set_modified(later).unwrap();
+        assert_eq!(
+            (before.ino(), before.len()),
+            (place(&bench).ino(), place(&bench).len())
+        );
+        if is_down {
+            bench.restart();
+        }
+        let news = bench.news();
+        assert_eq!(news.len(), 28, "{is_down}: {news:?}");
+        assert_eq!(news[14], "5:15");
+        bench.append("5.csv", &row(29, 29.0));
+        assert_eq!(bench.news(), ["5:29"]);
+        assert!(bench.faults.is_empty(), "{:?}", bench.faults);
+    }
 }
 
 #[test]

@@ -457,6 +457,31 @@ async fn a_red_is_reported_before_everything_that_waits_for_a_slow_hook() {
     assert!(dispatcher.close(LIMIT).await.is_some());
 }
 
+/// Runs for unknown that hang, of as many benchmarks as run at a time, and one for orange at the benchmark that turns red.
+#[tokio::test]
+async fn a_red_waits_for_no_run_of_a_lesser_alert_that_hangs() {
+    let script = "echo \"$SLIPWATCH_BENCHMARK $SLIPWATCH_LEVEL\" >> calls; [ $SLIPWATCH_LEVEL = red ] || exec sleep 600";
+    let (folder, mut config) = hook(script);
+    config.levels.push(Level::Unknown);
+    config.timeout = Duration::from_secs(900);
+    let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
+    let offer = |benchmark, level| {
+        assert!(dispatcher.offer(&alert_at(benchmark, level, AlertState::Firing)));
+    };
+    let calls = || read(&folder, "calls");
+    for benchmark in ["1", "2", "3"] {
+        offer(benchmark, Level::Unknown);
+    }
+    offer("4", Level::Orange);
+    eventually("four runs that hang", || calls().lines().count() == 4).await;
+    offer("5", Level::Red);
+    eventually("the red of a fifth benchmark", || calls().contains("5 red")).await;
+    // Its own orange is given some seconds to end, so that messages come in their order.
+    offer("4", Level::Red);
+    eventually("the red of the fourth", || calls().contains("4 red")).await;
+    assert!(dispatcher.close(Duration::ZERO).await.is_none());
+}
+
 #[tokio::test]
 async fn what_is_superseded_while_it_waits_is_not_reported_and_a_silence_that_is_over_neither() {
     let (folder, mut config) =

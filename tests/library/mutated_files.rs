@@ -25,7 +25,7 @@ fn copies() -> usize {
 }
 
 /// What damage is made of: signs that mean something to either reader.
-const SIGNS: [&[u8]; 12] = [
+const SIGNS: [&[u8]; 14] = [
     b"NaN",
     b"inf",
     b"-",
@@ -37,6 +37,8 @@ const SIGNS: [&[u8]; 12] = [
     b"\0",
     b"\xff\xfe",
     b"T24:00:00Z",
+    b"9999-12-31T24:00:00+02:00",
+    b"9999-12-30T24:00:00Z",
     b"}",
 ];
 

@@ -80,7 +80,7 @@ enum Action {
         /// Where
         #[arg(long, value_name = "ID")]
         benchmark: String,
-        /// For how long, such as 8h; thirty days at most
+        /// For how long, such as 8h; thirty days at most, seven of a red: the next red is not reported either
         #[arg(long = "for", value_name = "DURATION", value_parser = value::duration)]
         span: SignedDuration,
         #[command(flatten)]

@@ -24,6 +24,21 @@ pub(super) fn days_of_one(benchmarks: &BTreeMap<String, PlannedBenchmark>) -> Op
     ))
 }
 
+/// What a source's file is called whose benchmark is named after it, with a * for the date in it: a logger that begins a file each day gives the
+/// next one another name.
+pub(super) fn of_one_day(path: &str, benchmarks: &[PlannedBenchmark]) -> Option<String> {
+    let (folder, name) = path.rsplit_once('/').unwrap_or(("", path));
+    let is_its_name = |one: &PlannedBenchmark| {
+        let id = one.id.as_str();
+        name.starts_with(id) && without_date(id).is_some()
+    };
+    let pattern = without_date(name).filter(|_| benchmarks.iter().any(is_its_name))?;
+    Some(match folder {
+        "" => pattern,
+        folder => format!("{folder}/{pattern}"),
+    })
+}
+
 /// The name with a * for its date, such as 20261128 or 2026-11-28; `None` where it has none.
 fn without_date(name: &str) -> Option<String> {
     let starts = name.char_indices().map(|(at, _)| at);

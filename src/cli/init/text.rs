@@ -1,7 +1,7 @@
 //! The site file that is written: what was found, and what can be added, in comments.
 
 use super::times::word;
-use super::{DayZero, InitPlan};
+use super::{DayZero, InitPlan, dated};
 use crate::config::SourceKind;
 use crate::reading::{DecimalMark, Delimiter, TimeFormat};
 use std::fmt::Write as _;
@@ -70,6 +70,14 @@ fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPla
         source.kind.name(),
         quoted(&source.path)
     );
+    if let Some(pattern) = dated::of_one_day(&source.path, &plan.benchmarks) {
+        let _ = writeln!(
+            text,
+            "# The file's name has a date. If another file begins each day: path = {}, and in [[benchmark]] an id without the\n\
+             # date and column = \"NAME\", its column's name in the header.",
+            quoted(&pattern)
+        );
+    }
     let named = source.zone.as_ref().and_then(|zone| zone.iana_name());
     let zone = plan.zone.as_deref().or(named);
     if let Some(zone) = zone.filter(|_| source.kind != SourceKind::Mcap) {

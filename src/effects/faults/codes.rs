@@ -3,12 +3,40 @@
 use super::nature::Nature;
 use super::trace::Trace;
 
-/// Numbers that loggers write where they have none (Campbell, USGS, NOAA and common usage).
-const CODES: [f64; 22] = [
-    -7999.0, -6999.0, 6999.0, 7999.0, -9999.0, 9999.0, -9999.9, -99999.0, 99999.0, -999.0, 999.0,
-    -999.9, 999.9, -999.99, 9999.9, -9999.99, -888.0, -32768.0, 32767.0, -999_999.0, 999_999.0,
+/// Numbers that loggers write where they have none (Campbell, USGS, NOAA, the largest of 16 and of 32 bits, and common usage).
+const CODES: [f64; 26] = [
+    -7999.0,
+    -6999.0,
+    6999.0,
+    7999.0,
+    -9999.0,
+    9999.0,
+    -9999.9,
+    -99999.0,
+    99999.0,
+    -999.0,
+    999.0,
+    -999.9,
+    999.9,
+    -999.99,
+    9999.9,
+    -9999.99,
+    -888.0,
+    -32768.0,
+    32767.0,
+    -999_999.0,
+    999_999.0,
     -8888.0,
+    65_535.0,
+    4_294_967_295.0,
+    f32::MAX as f64,
+    1e30,
 ];
+
+/// Whether loggers write this number where they have none.
+pub fn is_code(value: f64) -> bool {
+    CODES.contains(&value)
+}
 
 /// Which values are no measurements. `nature` is absent for a benchmark's own readings.
 pub(super) fn out_of_range(trace: &Trace, nature: Option<Nature>) -> Vec<bool> {
@@ -25,7 +53,7 @@ pub(super) fn out_of_range(trace: &Trace, nature: Option<Nature>) -> Vec<bool> {
 /// The codes among the values: far from both neighbours that are none, so that a displacement
 /// which happens to pass through 999 mm is left alone.
 fn codes(trace: &Trace) -> Vec<bool> {
-    let is_code: Vec<bool> = trace.values.iter().map(|v| CODES.contains(v)).collect();
+    let is_code: Vec<bool> = trace.values.iter().map(|v| is_code(*v)).collect();
     let rest = trace
         .values
         .iter()

@@ -27,6 +27,7 @@ use smooth::Smoothness;
 use std::ops::Range;
 use trace::Trace;
 
+pub use codes::is_code;
 pub(super) use trace::resolution;
 
 /// Readings and covariates without the faults that were found in them.

@@ -32,6 +32,9 @@ const ALL_AT_ONCE: f64 = 5.0;
 const FIRST_ALL_AT_ONCE: f64 = 3.0;
 /// A slope that accelerates to failure leads up to it: the last step before it is the largest, and so many times the usual one.
 const LEADS_UP: f64 = 2.0;
+/// Of rain and of a river: fewest values above zero, and how many times the next largest a value is that cannot be.
+const FEWEST_FALLS: usize = 20;
+const BEYOND_ANY_PEAK: f64 = 100.0;
 /// Outliers are few; where there are more, the noise has heavy tails and none is a mistake.
 const FEW: f64 = 0.02;
 
@@ -91,8 +94,7 @@ fn last_alone(trace: &Trace, all_at_once: f64) -> Option<f64> {
 pub(super) fn outlying_samples(trace: &Trace, nature: Nature) -> Vec<bool> {
     let mut wrong = outlying(trace, FAR_IN_CHANNEL, TOGETHER_WHERE_IT_COMES_BACK);
     if nature.has_peaks() {
-        wrong.fill(false);
-        return wrong;
+        return beyond_any_peak(trace);
     }
     let rest = trace
         .values
@@ -109,6 +111,16 @@ pub(super) fn outlying_samples(trace: &Trace, nature: Nature) -> Vec<bool> {
         *wrong &= is_dip || value > high + width;
     }
     wrong
+}
+
+/// Where one value is more than so many times the next largest of many it is no shower and no flood.
+fn beyond_any_peak(trace: &Trace) -> Vec<bool> {
+    let mut sorted: Vec<f64> = trace.values.clone();
+    sorted.sort_by(f64::total_cmp);
+    let falls = sorted.iter().filter(|value| **value > 0.0).count();
+    let second = sorted.len().checked_sub(2).map_or(0.0, |at| sorted[at]);
+    let is_beyond = |value: &f64| falls >= FEWEST_FALLS && *value > BEYOND_ANY_PEAK * second;
+    trace.values.iter().map(is_beyond).collect()
 }
 
 fn outlying(trace: &Trace, far: f64, together: usize) -> Vec<bool> {

@@ -6,6 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
+mod peaks;
 mod totals;
 mod units;
 const COUNT: usize = 400;
@@ -436,19 +437,6 @@ fn codes_and_impossible_values_are_taken_out() {
     );
     assert_eq!(found(&rain), [(FaultKind::OutOfRange, day(100))]);
     assert_eq!(rain.channels[0].samples.len(), COUNT - 1);
-}
-
-#[test]
-fn a_displacement_that_passes_a_code_and_a_river_that_flows_back_are_measured() {
-    let passes = inspect_displacement(0, |day| 800.0 + day as f64 + (day % 3) as f64);
-    let codes = passes
-        .faults
-        .iter()
-        .filter(|f| f.kind == FaultKind::OutOfRange);
-    assert_eq!(codes.count(), 0);
-    let noise = noise(20);
-    let tidal = inspect_channel("river_m3_s", "m3_s", |day| 50.0 * noise[day]);
-    assert_eq!(tidal.faults, []);
 }
 
 #[test]

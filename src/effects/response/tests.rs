@@ -221,6 +221,41 @@ fn the_first_day_after_a_long_gap_is_not_spread_over_it() {
 }
 
 #[test]
+fn a_gauge_that_reports_only_while_it_rains_is_dry_between() {
+    // Showers of two to five hours, four to sixteen hours apart, and a drought each ten days.
+    let hours = 24 * 90;
+    let (mut falls, mut left, mut dry) = (vec![0.0; hours], 0, 3);
+    for (hour, fall) in falls.iter_mut().enumerate() {
+        if left > 0 {
+            *fall = 1.0 + (hour % 4) as f64;
+            left -= 1;
+        } else if dry > 0 {
+            dry -= 1;
+        } else {
+            (left, dry) = (
+                2 + hour % 4,
+                if hour % 10 == 0 { 60 } else { 4 + hour % 13 },
+            );
+        }
+    }
+    let times: Vec<f64> = (0..hours).map(|hour| hour as f64 / 24.0).collect();
+    let of_channel = |times: &[f64], values: &[f64]| {
+        let driver = Driver::new(0, &channel("rain_mm", times, values), epoch()).unwrap();
+        driver.respond(
+            of(Form::Level, 1, 5.0),
+            &[20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0],
+        )
+    };
+    let whole = of_channel(&times, &falls).unwrap();
+    let wet = times.iter().zip(&falls).filter(|(_, fall)| **fall > 0.0);
+    let (wet_times, wet_falls): (Vec<f64>, Vec<f64>) = wet.unzip();
+    let given = of_channel(&wet_times, &wet_falls).unwrap();
+    for (given, right) in given.iter().zip(&whole) {
+        assert!((given - right).abs() < 0.05, "{given} for {right}");
+    }
+}
+
+#[test]
 fn a_running_total_acts_as_the_amounts_that_it_sums() {
     let (by_day, totals) = rain(120);
     let mut sum = 300.0;

@@ -195,7 +195,7 @@ impl Track {
     }
 
     /// The end of a silence, where the reading of `time` is one.
-    fn read_again(&mut self, now: Timestamp, time: Timestamp) -> Option<Event> {
+    fn read_again(&mut self, now: Timestamp, time: Timestamp) -> Vec<Event> {
         self.quality.read_again(&mut self.record, now, time)
     }
 

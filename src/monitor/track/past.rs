@@ -98,7 +98,7 @@ impl Track {
             return;
         }
         let (mut earlier, mut context) = (self.past(time).track, *context);
-        let Ok(mut next) = time.checked_sub(COURSES * policy.red_course()) else {
+        let Ok(mut next) = time.checked_sub(policy.red_course().saturating_mul(COURSES)) else {
             return;
         };
         let readings = self.record.observations().values.iter();

@@ -65,7 +65,7 @@ impl Track {
         now: Timestamp,
         time: Timestamp,
         until: Timestamp,
-    ) -> Option<Event> {
+    ) -> Vec<Event> {
         (self.quality).note_waiting(&mut self.record, now, (time, until))
     }
 
@@ -108,6 +108,11 @@ impl Track {
     /// Whether it gives no readings.
     pub(in crate::monitor) fn is_silent(&self) -> bool {
         self.record.is_silent()
+    }
+
+    /// Whether its readings come many together, long after they were measured.
+    pub(in crate::monitor) fn comes_in_batches(&self) -> bool {
+        self.record.comes_in_batches()
     }
 
     /// Whether its times lie ahead of the clock.

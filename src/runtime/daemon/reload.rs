@@ -39,7 +39,7 @@ impl Daemon {
     /// The config file as it is now with its token, or why it cannot be taken.
     fn fresh_config(&self) -> Result<(Config, Option<Token>), String> {
         let mut fresh = config::load(&self.config.file).map_err(|error| error.to_string())?;
-        fresh.wall_in_hooks(Path::new(OURSELVES));
+        fresh.sandbox_hooks(Path::new(OURSELVES));
         let (there, here) = (&fresh.site, &self.config.site);
         let changed = [
             ("state_dir", there.state_dir != here.state_dir),

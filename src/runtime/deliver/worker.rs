@@ -27,6 +27,10 @@ const LOOK_AGAIN_MUTED: Duration = Duration::from_secs(1);
 
 /// Runs of one hook at a time, each for another benchmark.
 const MOST_AT_ONCE: usize = 4;
+/// So many more of red and orange: runs for less that hang keep none of them waiting.
+const MORE_OF_THE_GRAVE: usize = 2;
+/// A run that lasts longer than this does not keep a graver alert of its own benchmark waiting either.
+const KEEPS_WAITING: Duration = Duration::from_secs(10);
 
 #[derive(Debug)]
 struct Waiting {
@@ -54,6 +58,11 @@ fn gravity(alert: &Alert) -> u8 {
         (Level::Yellow, _) => 1,
         (Level::Green, _) => 0,
     }
+}
+
+/// Whether people may have to leave their houses.
+fn is_grave(alert: &Alert) -> bool {
+    gravity(alert) >= 4
 }
 
 /// What is reported by one run at a time, so that its order stays.
@@ -139,12 +148,11 @@ impl Worker {
                     Err(_) => break,
                 }
             }
-            while self.running.len() < MOST_AT_ONCE && self.start_next(open) {}
+            while self.start_next(open) {}
             if !open && self.running.is_empty() {
                 return self.lost;
             }
             let due = self.next_due();
-            let is_full = self.running.len() >= MOST_AT_ONCE;
             tokio::select! {
                 biased;
                 alert = queue.recv(), if open && self.untried < QUEUE => match alert {
@@ -155,20 +163,33 @@ impl Worker {
                     let run = self.running.swap_remove(run);
                     self.note_outcome(&run.waiting, outcome.as_ref(), open);
                 }
-                () = until(due), if !is_full && due.is_some() => {}
+                () = until(due), if due.is_some() => {}
             }
         }
     }
 
-    /// When the next one is due whose benchmark nothing is being reported.
+    /// When the next one may be started.
     fn next_due(&self) -> Option<Instant> {
-        let mut free = self.waiting.iter().filter(|(_, one)| self.is_free(one));
-        free.next().map(|((due, _), _)| *due)
+        let waiting = self.waiting.iter();
+        let each = waiting.filter_map(|((due, _), one)| self.free_from(*due, one));
+        each.min()
     }
 
-    fn is_free(&self, waiting: &Waiting) -> bool {
-        let mut running = self.running.iter();
-        running.all(|run| place(&run.waiting.alert) != place(&waiting.alert))
+    /// From when on it may be started, at `due` or later; `None` before another run has ended.
+    fn free_from(&self, due: Instant, waiting: &Waiting) -> Option<Instant> {
+        let is_grave = is_grave(&waiting.alert);
+        let more = if is_grave { MORE_OF_THE_GRAVE } else { 0 };
+        if self.running.len() >= MOST_AT_ONCE + more {
+            return None;
+        }
+        let mut at_its_place = self
+            .running
+            .iter()
+            .filter(|run| place(&run.waiting.alert) == place(&waiting.alert));
+        at_its_place.try_fold(due, |from, run| {
+            let is_graver = is_grave && gravity(&waiting.alert) > gravity(&run.waiting.alert);
+            is_graver.then(|| from.max(run.started + KEEPS_WAITING))
+        })
     }
 
     /// Starts the most severe alert that is due; on the way out everything is.
@@ -179,8 +200,11 @@ impl Worker {
         let due = self.waiting.iter();
         let due = due.take_while(|((due, _), _)| !open || *due <= now);
         let due = due.filter(|(_, waiting)| !waiting.is_held);
-        let free: Vec<(&Turn, &Waiting)> =
-            due.filter(|(_, waiting)| self.is_free(waiting)).collect();
+        let is_free = |(_, waiting): &(&Turn, &Waiting)| {
+            let from = self.free_from(now, waiting);
+            from.is_some_and(|from| from <= now)
+        };
+        let free: Vec<(&Turn, &Waiting)> = due.filter(is_free).collect();
         let next = free.iter().max_by_key(|((due, number), waiting)| {
             (gravity(&waiting.alert), std::cmp::Reverse((*due, *number)))
         });
@@ -194,7 +218,11 @@ impl Worker {
         locked(&self.in_hand).is_tried(&waiting.alert);
         let (hook, alert) = (Arc::clone(&self.hook), waiting.alert.clone());
         let task = tokio::spawn(self.runner.run(hook, alert, waiting.attempt));
-        self.running.push(Running { task, waiting });
+        self.running.push(Running {
+            task,
+            waiting,
+            started: now,
+        });
         true
     }
 
@@ -404,6 +432,7 @@ impl HookConfig {
 struct Running {
     task: JoinHandle<HookOutcome>,
     waiting: Waiting,
+    started: Instant,
 }
 
 impl Drop for Running {

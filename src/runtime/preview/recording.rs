@@ -2,7 +2,9 @@
 
 use super::refused::RefusedRow;
 use crate::runtime::ingest::{Item, decode_message};
-use crate::runtime::tail::records::{Channels, HEADER_BYTES, MAGIC, NextRecord, frame};
+use crate::runtime::tail::records::{
+    Channels, HEADER_BYTES, MAGIC, NextRecord, RawMessage, RecordFault, frame,
+};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -68,24 +70,37 @@ pub(super) fn read_recording(
             .map_err(fail)?;
         let goes_on = match channels.decode(opcode, &body) {
             Err(error) => each(Err(RefusedRow::of_text(named(file, &error)))),
-            Ok(messages) => messages.iter().all(|message| {
-                let decoded = decode_message(
-                    &message.topic,
-                    &message.metadata,
-                    message.publish_time,
-                    &message.payload,
-                );
-                match decoded {
-                    Ok(item) => item.is_none_or(|item| each(Ok(item))),
-                    Err(error) => each(Err(RefusedRow::of_message(&error, named(file, &error)))),
-                }
-            }),
+            Ok(messages) => messages
+                .into_iter()
+                .all(|message| each_of(file, message, &mut each)),
         };
         if !goes_on {
             return Ok(());
         }
     }
     Ok(())
+}
+
+/// Passes on what one message of a chunk holds; whether more is wanted.
+fn each_of(
+    file: &Path,
+    message: Result<RawMessage, RecordFault>,
+    each: &mut dyn FnMut(Result<Item, RefusedRow>) -> bool,
+) -> bool {
+    let message = match message {
+        Ok(message) => message,
+        Err(error) => return each(Err(RefusedRow::of_text(named(file, &error)))),
+    };
+    let RawMessage {
+        topic,
+        metadata,
+        publish_time,
+        payload,
+    } = &message;
+    match decode_message(topic, metadata, *publish_time, payload) {
+        Ok(item) => item.is_none_or(|item| each(Ok(item))),
+        Err(error) => each(Err(RefusedRow::of_message(&error, named(file, &error)))),
+    }
 }
 
 fn named(file: &Path, error: &impl std::fmt::Display) -> String {

@@ -223,14 +223,14 @@ async fn status(State(vitals): State<Arc<Vitals>>) -> Json<DaemonStatus> {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ByteRange {
+struct EventRange {
     since: Option<String>,
     limit: Option<usize>,
 }
 
 async fn events(
     State(archive): State<Arc<dyn Archive>>,
-    Query(range): Query<ByteRange>,
+    Query(range): Query<EventRange>,
 ) -> Result<Response, ArchiveError> {
     let limit = range.limit.unwrap_or(MOST_EVENTS).min(MOST_EVENTS);
     let page = tokio::task::spawn_blocking(move || archive.events(range.since.as_deref(), limit))

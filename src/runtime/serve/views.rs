@@ -84,7 +84,7 @@ async fn blocking<T: Send + 'static>(
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct StreamMoment {
+struct SiteMoment {
     #[serde(default, deserialize_with = "instant")]
     at: Option<Timestamp>,
 }
@@ -110,7 +110,7 @@ fn parsed<'de, D: Deserializer<'de>, T: FromStr>(
 
 async fn site(
     State(reader): State<Arc<SiteReader>>,
-    Query(moment): Query<StreamMoment>,
+    Query(moment): Query<SiteMoment>,
 ) -> Result<Json<SiteView>, Failure> {
     blocking(move || Ok(reader.site(moment.at)?))
         .await

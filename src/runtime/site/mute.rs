@@ -115,6 +115,19 @@ impl Mutes {
     }
 }
 
+/// Until when `level` is shelved, which somebody asked for `until`: of a red no longer than a silence may last, as the next red, which may be
+/// the true one, is not reported either.
+fn shelved_until(level: Level, until: Timestamp, given_at: Option<Timestamp>) -> Timestamp {
+    let latest = given_at.and_then(|given| given.checked_add(Order::LONGEST_SILENCE).ok());
+    match latest.filter(|_| level == Level::Red) {
+        Some(latest) if latest < until => {
+            tracing::warn!(%latest, asked = %until, "red is shelved for seven days at most");
+            latest
+        }
+        Some(_) | None => until,
+    }
+}
+
 /// Says in the log which of those that stood before stand no more: also one that ran out by itself.
 pub(in crate::runtime) fn announce_ends(before: &[Mute], now: &[Mute]) {
     for mute in before.iter().filter(|mute| !now.contains(mute)) {
@@ -164,7 +177,8 @@ impl Site {
                 given,
             } => {
                 let level = self.level_before(benchmark, &given.called_since);
-                self.mute((Some(benchmark), Some(level)), *until, given.given_at);
+                let until = shelved_until(level, *until, given.given_at);
+                self.mute((Some(benchmark), Some(level)), until, given.given_at);
             }
             Order::Silence {
                 benchmark,

@@ -10,11 +10,14 @@ use crate::runtime::ingest::{IngestError, Item, is_packed};
 use crate::runtime::site::is_logged;
 use std::collections::VecDeque;
 use std::fs::{File, Metadata};
+use std::hash::{DefaultHasher, Hasher};
 use std::io;
 use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// Bytes before the offset that are compared as a whole when the file has changed: an export that is written again in place keeps its last rows.
+const EARLIER_BYTES: u64 = 256 * 1024;
 /// Bytes of text that are read at once.
 const READ_BYTES: usize = 16 * 1024;
 /// Bytes before the offset that must not change.
@@ -41,6 +44,8 @@ pub(super) struct FileTail {
     pub(super) place: Option<FileId>,
     /// The last bytes before `at`: another file of the same number and size has others.
     pub(super) mark: Vec<u8>,
+    /// A hash of the bytes before the offset, [`EARLIER_BYTES`] at most; none while there is more to read.
+    pub(super) earlier: Option<u64>,
     /// As of the last look that found nothing more; the file is opened only when it differs.
     pub(super) idle: Option<Glance>,
     /// When it was last written to, as of the last read.
@@ -140,6 +145,7 @@ impl FileTail {
             at: 0,
             place: None,
             mark: Vec::new(),
+            earlier: None,
             idle: None,
             modified: (0, 0),
             changed: None,
@@ -271,9 +277,11 @@ impl FileTail {
             } else {
                 tracing::info!(file = %self.path.display(), at = self.at, "another file: read from its start");
             }
-            self.header_before = self.header();
-            self.content = Content::of(&self.decoder, &self.origin);
-            self.at = 0;
+            self.begin_anew();
+        } else if self.is_rewritten(&file)? {
+            // Known values are dropped as repeated.
+            tracing::info!(file = %self.path.display(), at = self.at, "what had been read of it is another text now: read from its start");
+            self.begin_anew();
         }
         self.place = Some(glance.place);
         self.modified = glance.modified;
@@ -288,6 +296,8 @@ impl FileTail {
         let moved = self.at != before;
         if moved {
             self.mark = read_at(&file, self.mark_start(), self.at - self.mark_start())?;
+            let is_at_end = self.at >= glance.size && matches!(self.content, Content::Text(_));
+            self.earlier = is_at_end.then(|| self.hash_of_earlier(&file)).transpose()?;
         }
         // A suspect record is looked at again although nothing changes any more.
         let suspect =
@@ -317,6 +327,27 @@ impl FileTail {
             return Ok(false);
         }
         Ok(read_at(file, self.mark_start(), self.at - self.mark_start())? == self.mark)
+    }
+
+    /// From its start, with the columns of its header before where it has none now.
+    fn begin_anew(&mut self) {
+        self.header_before = self.header();
+        self.content = Content::of(&self.decoder, &self.origin);
+        self.at = 0;
+        self.earlier = None;
+    }
+
+    /// Whether rows that have been read stand there otherwise, as in an export written over the one before; what has left its name is read on.
+    fn is_rewritten(&self, file: &File) -> io::Result<bool> {
+        let known = self.earlier.filter(|_| self.departed.is_none());
+        known.map_or(Ok(false), |known| Ok(self.hash_of_earlier(file)? != known))
+    }
+
+    fn hash_of_earlier(&self, file: &File) -> io::Result<u64> {
+        let from = self.at.saturating_sub(EARLIER_BYTES);
+        let mut hasher = DefaultHasher::new();
+        hasher.write(&read_at(file, from, self.at - from)?);
+        Ok(hasher.finish())
     }
 
     fn read_text(&mut self, file: &File) -> io::Result<()> {

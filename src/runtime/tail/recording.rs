@@ -1,7 +1,7 @@
 //! A recording on its way in, record by record.
 
 use super::file::{Content, FileTail, read_at};
-use super::records::{self, HEADER_BYTES, MAGIC, NextRecord, RawMessage};
+use super::records::{self, HEADER_BYTES, MAGIC, NextRecord, RawMessage, RecordFault};
 use crate::runtime::ingest::decode_message;
 use crate::runtime::site::is_logged;
 use std::fs::File;
@@ -59,18 +59,25 @@ impl FileTail {
             Ok(messages) => {
                 self.at = end;
                 for message in messages {
-                    self.take_message(&message);
+                    match message {
+                        Ok(message) => self.take_message(&message),
+                        Err(error) => self.quarantine_record(&error),
+                    }
                 }
             }
             Err(_) if is_last && *suspect != Some(self.at) => *suspect = Some(self.at),
             Err(error) => {
-                self.quarantined += 1;
-                let (file, offset, total) = (self.path.display(), self.at, self.quarantined);
-                if is_logged(total) {
-                    tracing::warn!(%file, offset, %error, total, "record quarantined");
-                }
+                self.quarantine_record(&error);
                 self.at = end;
             }
+        }
+    }
+
+    fn quarantine_record(&mut self, error: &RecordFault) {
+        self.quarantined += 1;
+        let (file, offset, total) = (self.path.display(), self.at, self.quarantined);
+        if is_logged(total) {
+            tracing::warn!(%file, offset, %error, total, "record quarantined");
         }
     }
 

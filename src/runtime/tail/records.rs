@@ -117,6 +117,9 @@ pub enum RecordFault {
     },
 }
 
+/// What the records of a chunk hold, in their order.
+pub type MessagesRead = Vec<Result<RawMessage, RecordFault>>;
+
 /// A channel's topic and metadata.
 type Described = (String, BTreeMap<String, String>);
 
@@ -128,28 +131,22 @@ pub struct Channels {
 }
 
 impl Channels {
-    /// The messages in one whole record.
+    /// The messages in one whole record; where it is a chunk, each record in it that cannot be used has its fault instead.
     ///
     /// # Errors
-    /// [`RecordFault`]; the table of channels is as it was, or as far as the record was right.
-    pub fn decode(&mut self, opcode: u8, body: &[u8]) -> Result<Vec<RawMessage>, RecordFault> {
-        let mut messages = Vec::new();
-        if opcode == op::CHUNK {
-            for (opcode, body) in unpack(body)? {
-                self.take(opcode, &body, &mut messages)?;
-            }
-        } else {
-            self.take(opcode, body, &mut messages)?;
+    /// [`RecordFault`] of the whole record; the table of channels is as it was.
+    pub fn decode(&mut self, opcode: u8, body: &[u8]) -> Result<MessagesRead, RecordFault> {
+        if opcode != op::CHUNK {
+            return Ok(self.take(opcode, body)?.into_iter().map(Ok).collect());
         }
-        Ok(messages)
+        let records = unpack(body)?.into_iter();
+        Ok(records
+            .filter_map(|(opcode, body)| self.take(opcode, &body).transpose())
+            .collect())
     }
 
-    fn take(
-        &mut self,
-        opcode: u8,
-        body: &[u8],
-        messages: &mut Vec<RawMessage>,
-    ) -> Result<(), RecordFault> {
+    /// The message, where the record is one.
+    fn take(&mut self, opcode: u8, body: &[u8]) -> Result<Option<RawMessage>, RecordFault> {
         if opcode == op::CHANNEL
             && let Record::Channel(channel) = parse_record(opcode, body)?
         {
@@ -171,14 +168,14 @@ impl Channels {
             let Some((topic, metadata)) = self.by_id.get(&id) else {
                 return Err(RecordFault::UnknownChannel { id });
             };
-            messages.push(RawMessage {
+            return Ok(Some(RawMessage {
                 topic: topic.clone(),
                 metadata: metadata.clone(),
                 publish_time: header.publish_time,
                 payload: data.into_owned(),
-            });
+            }));
         }
-        Ok(())
+        Ok(None)
     }
 }
 
@@ -233,4 +230,68 @@ fn distrust(header: &ChunkHeader, data: &[u8]) -> Result<(), RecordFault> {
     }
     let whole = rest.is_empty() && header.uncompressed_size == data.len() as u64;
     whole.then_some(()).ok_or(RecordFault::Contradiction)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
+        let length = (body.len() as u64).to_le_bytes();
+        [&[opcode], length.as_slice(), body].concat()
+    }
+
+    fn text(text: &str) -> Vec<u8> {
+        let length = u32::try_from(text.len()).unwrap().to_le_bytes();
+        [length.as_slice(), text.as_bytes()].concat()
+    }
+
+    fn channel(id: u16, topic: &str) -> Vec<u8> {
+        let (id, no_schema, no_metadata) = (id.to_le_bytes(), [0; 2], [0; 4]);
+        let parts = [
+            &id[..],
+            &no_schema,
+            &text(topic),
+            &text("json"),
+            &no_metadata,
+        ];
+        record(op::CHANNEL, &parts.concat())
+    }
+
+    fn message(id: u16, payload: &[u8]) -> Vec<u8> {
+        let (id, number_and_times) = (id.to_le_bytes(), [0; 20]);
+        record(op::MESSAGE, &[&id[..], &number_and_times, payload].concat())
+    }
+
+    /// The body of a chunk without compression and CRC.
+    fn chunk(records: &[u8]) -> Vec<u8> {
+        let length = (records.len() as u64).to_le_bytes();
+        let (times, no_crc) = ([0; 16], [0; 4]);
+        [&times[..], &length, &no_crc, &text(""), &length, records].concat()
+    }
+
+    #[test]
+    fn one_record_of_a_chunk_that_cannot_be_used_loses_no_other() {
+        let records = [
+            channel(1, "/a"),
+            message(1, b"first"),
+            message(7, b"of nobody"),
+            channel(1, "/b"),
+            message(1, b"last"),
+        ];
+        let body = chunk(&records.concat());
+        let read = Channels::default().decode(op::CHUNK, &body).unwrap();
+        let shown = |one: &Result<RawMessage, RecordFault>| match one {
+            Ok(message) => String::from_utf8(message.payload.clone()).unwrap(),
+            Err(fault) => fault.to_string(),
+        };
+        let shown: Vec<String> = read.iter().map(shown).collect();
+        let expected = [
+            "first",
+            "a message on the unknown channel 7",
+            "channel 1 was /a and is now /b",
+            "last",
+        ];
+        assert_eq!(shown, expected);
+    }
 }

@@ -46,6 +46,7 @@ impl FileTail {
         file.at = saved.at;
         file.place = saved.place;
         file.mark.clone_from(&saved.mark);
+        file.earlier = saved.earlier;
         file.reported = saved.clone();
         // From here on these readings are taken from it, though it may not grow.
         file.safe = Saved {
@@ -103,6 +104,7 @@ impl FileTail {
             at: self.at,
             place: self.place,
             mark: self.mark.clone(),
+            earlier: self.earlier,
             content,
             origin: (self.origin != self.path).then(|| self.origin.clone()),
             read_as: Some(Arc::clone(self.decoder.read_as())),

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::error::Error;
 use std::fmt::Debug;
 use std::io::{self, Read};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// Unpacked bytes that are taken at once.
@@ -133,7 +134,10 @@ impl TextReader {
         text: String,
         fed: &mut LinesRead,
     ) -> (String, Option<DecodeFault>) {
-        let taken = self.rows.take(number, &text);
+        let taken = match guarded(|| self.rows.take(number, &text)) {
+            Ok(taken) => taken,
+            Err(fault) => return (text, Some(fault.into())),
+        };
         for item in taken.items {
             fed.items.push((number, self.units.convert(item)));
         }
@@ -150,6 +154,16 @@ impl TextReader {
     pub(in crate::runtime) fn is_within_a_line(&self) -> bool {
         self.lines.is_within_a_line()
     }
+}
+
+/// A mistake of the program while it read a line.
+#[derive(Debug, thiserror::Error)]
+#[error("the program failed while it read this line, which is passed over; please report it")]
+struct LineBroke;
+
+/// What `work` gives: a line on which the program fails must not end the reading of all others, at each start anew.
+fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, LineBroke> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|_| LineBroke)
 }
 
 /// Takes the lines of a header that was read before.
@@ -214,5 +228,17 @@ impl Unpacking {
     /// What is left when all has been read: a packed file has no more to come behind its last line.
     pub(super) fn end(&mut self) -> LinesRead {
         self.text.feed(b"\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_on_which_the_program_fails_is_a_fault_of_that_line() {
+        let fault = guarded(|| -> u8 { panic!("a mistake") }).unwrap_err();
+        assert!(fault.to_string().contains("passed over"));
+        assert_eq!(guarded(|| 7).unwrap(), 7);
     }
 }

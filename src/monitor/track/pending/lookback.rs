@@ -13,9 +13,13 @@ use crate::monitor::track::forecast::{Forecast, LookAhead};
 use crate::monitor::track::record::BenchmarkRecord;
 use crate::reading::Timestamp;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Forecasts of one look back, over the readings as they were and as they are.
 const MOST_FORECASTS: usize = 64;
+/// Forecasts by which the mean chance that calls red begins, over so many of its spans.
+const MOST_BEFORE: usize = 24;
+const COURSES: f64 = 4.0;
 
 /// What came late since the last newest reading.
 #[derive(Debug, Serialize, Deserialize)]
@@ -98,7 +102,8 @@ impl Pending {
     }
 }
 
-/// The highest level that forecasts after readings from `since` on would have called.
+/// The highest level that forecasts after readings from `since` on would have called. The mean chance that calls red begins with the readings
+/// before, as it did then.
 fn highest(
     policy: &Policy,
     history: &History,
@@ -108,25 +113,39 @@ fn highest(
     let values = &observations.values;
     let since = history.days(since);
     let first = values.partition_point(|one| one.t_days < since);
-    let all: Vec<usize> = (first..values.len()).collect();
-    let every = all.len().div_ceil(MOST_FORECASTS).max(1);
     let (mut latch, mut held) = (Latch::default(), Held::default());
     let mut highest = Level::Green;
-    // Counted from the newest on, which has the most to say.
-    for index in all.iter().rev().step_by(every).rev() {
+    let mut after = |index: usize, is_judged: bool| {
         let known = Observations {
-            values: values[..=*index].to_vec(),
+            values: values[..=index].to_vec(),
             ..observations.clone()
         };
-        let Some(now) = history.time(values[*index].t_days) else {
-            continue;
+        let Some(now) = history.time(values[index].t_days) else {
+            return;
         };
         let mut evidence = evidence(policy, &known, now);
         held.update(policy, &mut evidence);
-        latch.update(policy, &evidence);
-        highest = highest.max(latch.level());
+        if is_judged {
+            latch.update(policy, &evidence);
+            highest = highest.max(latch.level());
+        }
+    };
+    let course = COURSES * days(policy.red_course());
+    let begins = values.partition_point(|one| one.t_days < since - course);
+    for index in newest_of(begins..first, MOST_BEFORE) {
+        after(index, false);
+    }
+    for index in newest_of(first..values.len(), MOST_FORECASTS) {
+        after(index, true);
     }
     highest
+}
+
+/// At most so many of these places, evenly: counted from the newest on, which has the most to say.
+fn newest_of(places: Range<usize>, most: usize) -> impl Iterator<Item = usize> {
+    let every = places.len().div_ceil(most).max(1);
+    let chosen: Vec<usize> = places.rev().step_by(every).collect();
+    chosen.into_iter().rev()
 }
 
 fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> AlertEvidence {

@@ -90,9 +90,9 @@ impl DataQuality {
         &mut self,
         record: &mut BenchmarkRecord,
         time: Timestamp,
-    ) -> Option<Event> {
+    ) -> Vec<Event> {
         if !self.is_stuck() {
-            return None;
+            return Vec::new();
         }
         record.note_range_end(None);
         let text = format!(
@@ -131,10 +131,10 @@ impl DataQuality {
         &mut self,
         record: &BenchmarkRecord,
         time: Timestamp,
-    ) -> Option<Event> {
+    ) -> Vec<Event> {
         self.others = 0;
         if !self.unknown.has(Reason::SecondQuantity) {
-            return None;
+            return Vec::new();
         }
         let text = format!(
             "benchmark {} gives what is monitored again",
@@ -177,9 +177,9 @@ impl DataQuality {
         record: &mut BenchmarkRecord,
         now: Timestamp,
         time: Timestamp,
-    ) -> Option<Event> {
-        let since = record.break_silence(time)?;
-        self.ends_silence(record, now, since)
+    ) -> Vec<Event> {
+        let since = record.break_silence(time);
+        since.map_or_else(Vec::new, |since| self.ends_silence(record, now, since))
     }
 
     /// The end of a silence, where the reading of `time`, which waits for earlier ones, is one at `until`.
@@ -188,9 +188,9 @@ impl DataQuality {
         record: &mut BenchmarkRecord,
         now: Timestamp,
         (time, until): (Timestamp, Timestamp),
-    ) -> Option<Event> {
-        let since = record.note_waiting(time, until)?;
-        self.ends_silence(record, now, since)
+    ) -> Vec<Event> {
+        let since = record.note_waiting(time, until);
+        since.map_or_else(Vec::new, |since| self.ends_silence(record, now, since))
     }
 
     fn ends_silence(
@@ -198,7 +198,7 @@ impl DataQuality {
         record: &BenchmarkRecord,
         now: Timestamp,
         since: Timestamp,
-    ) -> Option<Event> {
+    ) -> Vec<Event> {
         let text = format!("benchmark {} reads again", record.benchmark());
         self.ends_unknown(record, now, since, Reason::NoData, text)
     }
@@ -222,7 +222,7 @@ mod tests {
         assert!(is_fault(&events[0], "stuck-sensor") && events.len() == 2);
         assert!(quality.is_stuck() && quality.shows_motion());
         assert_eq!(record.observations().values.len(), 21);
-        assert!(quality.unstick(&mut record, at(28)).is_some());
+        assert_eq!(quality.unstick(&mut record, at(28)).len(), 1);
         assert!(!quality.is_unknown());
     }
 
@@ -232,7 +232,7 @@ mod tests {
         let hardly = record([0.0]);
         let said = (0..4).map(|hour| quality.count_other(&hardly, at(hour)).is_some());
         assert_eq!(said.collect::<Vec<bool>>(), [false, false, true, false]);
-        assert!(quality.count_own(&hardly, at(5)).is_some());
+        assert_eq!(quality.count_own(&hardly, at(5)).len(), 1);
         let read = record((0..9).map(f64::from));
         let said = (0..24).filter(|hour| quality.count_other(&read, at(*hour)).is_some());
         assert_eq!(said.collect::<Vec<i64>>(), [23]);
@@ -245,7 +245,7 @@ mod tests {
         let events = quality.fall_silent(&mut record, at(20), Some("NAN"), Level::Red);
         assert!(is_fault(&events[0], "no-data") && events.len() == 2);
         assert!(quality.is_unknown() && record.is_silent());
-        assert!(quality.read_again(&mut record, at(21), at(21)).is_some());
+        assert_eq!(quality.read_again(&mut record, at(21), at(21)).len(), 1);
         assert!(!quality.is_unknown() && !record.is_silent());
     }
 }

@@ -183,6 +183,11 @@ impl BenchmarkRecord {
         self.silence.counted_from()
     }
 
+    /// Whether its readings come many together, long after they were measured.
+    pub(super) fn comes_in_batches(&self) -> bool {
+        self.silence.comes_in_batches()
+    }
+
     /// What comes now was measured long before `time`, which it is by the clock.
     pub(super) fn is_behind(&mut self, time: Timestamp) {
         self.silence.is_behind(time);
