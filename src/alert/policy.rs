@@ -69,7 +69,7 @@ const FARTHEST_READING: SignedDuration = SignedDuration::from_hours(30 * 24);
 /// and people act then.
 pub fn to_the_next_reading(span: SignedDuration, interval_days: f64) -> SignedDuration {
     let interval = SignedDuration::try_from_secs_f64(interval_days * SECONDS_PER_DAY);
-    let interval = interval.unwrap_or(FARTHEST_READING);
+    let interval = interval.unwrap_or_default();
     span.saturating_add(interval.min(FARTHEST_READING))
 }
 

@@ -1,8 +1,9 @@
 //! Asks a site's state, beside a running daemon or without one: its events, a copy of it.
 
 use super::args::{OutputArgs, OutputFormat};
+use super::exit::complain;
 use super::text;
-use crate::config::{self, Config};
+use crate::config::{self, Config, ConfigError};
 use crate::monitor::EventKind;
 use crate::reading::BenchmarkId;
 use crate::store::Store;
@@ -24,17 +25,23 @@ pub(super) struct SiteArgs {
 }
 
 impl SiteArgs {
+    /// The config as far as it is right, where a daemon runs on its state, with the config that was right before.
+    fn of_the_daemon(&self, refused: ConfigError) -> anyhow::Result<Config> {
+        let config = match config::load_as_far_as_right(&self.config) {
+            Ok(config) if Store::is_held(&config.site.state_dir) => config,
+            Ok(_) | Err(_) => return Err(refused.into()),
+        };
+        let (file, state) = (self.config.display(), config.site.state_dir.display());
+        complain(&format!(
+            "{file} has errors, which slipwatch check lists; what is asked goes to the daemon that runs on {state}, with the config before"
+        ));
+        Ok(config)
+    }
+
     /// Its config and its state. The daemon goes on with the config before while the file is wrong, and so does who asks it.
     pub(super) fn open(&self) -> anyhow::Result<(Config, Store)> {
         let config = match config::load(&self.config) {
-            Err(refused) => {
-                let config = config::load_as_far_as_right(&self.config).map_err(|_| refused)?;
-                let (file, state) = (self.config.display(), config.site.state_dir.display());
-                tracing::warn!(
-                    "{file} has errors, which slipwatch check lists; the state in {state} is used"
-                );
-                config
-            }
+            Err(refused) => self.of_the_daemon(refused)?,
             Ok(config) => config,
         };
         let folder = &config.site.state_dir;

@@ -276,7 +276,8 @@ pub fn load(file: &Path) -> Result<Config, ConfigError> {
     parse(&text, file)
 }
 
-/// The site file at `file` as far as it is right, where it says which state is meant: who gives an order, or looks, need not mend it first.
+/// The site file at `file` as far as it is right, where it says which state is meant: for commands that only need that, a mistake elsewhere in the
+/// file stops nothing. All benchmarks of the state are taken for watched.
 ///
 /// # Errors
 /// [`ConfigError`] as of [`load`], where nothing can be made of it.
@@ -287,9 +288,11 @@ pub fn load_as_far_as_right(file: &Path) -> Result<Config, ConfigError> {
     };
     let text = read(file).unwrap_or_default();
     let (config, _) = taken(&text, file);
-    config
+    let mut config = config
         .filter(|config| config.site.state_dir.is_dir())
-        .ok_or(refused)
+        .ok_or(refused)?;
+    config.settings.watched.is_open = true;
+    Ok(config)
 }
 
 /// The text of the file; `-` is stdin, which is read once.

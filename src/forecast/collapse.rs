@@ -38,8 +38,8 @@ const SLOWED: f64 = 0.5;
 /// ratio. Set on simulated slopes: storms, thaws and fits of stick-slip repeat, and a collapse is mostly faster than all
 /// before it.
 const SURVIVED: i32 = 2;
-/// A slope of which it is all but sure that it accelerates, but for this chance, is half as much the less likely to collapse for either: its
-/// first burst is a part of this crisis. Set on drawn shapes of failure under measured noise: of 72, four more were red a day before, and of as
+/// At this chance that the slope does not accelerate what is taken off a chance for either counts by its root; where it surely accelerates nothing is
+/// taken off, as the first burst belongs to the same crisis. Set on drawn shapes of failure under measured noise: of 72, four more were red a day before, and of as
 /// many that stand no more.
 const ALL_BUT_SURE: f64 = 0.01;
 /// Spans before the one whose chance also counts within them, the power of time with which it grows, and how far readings are apart, days,
@@ -146,9 +146,12 @@ impl Indicators {
     /// Whether levels may be given a chance within `days` of at least `chance`, whatever is expected.
     pub fn may_reach(&self, days: f64, chance: f64) -> bool {
         let days = days + self.scales.centred_before_days;
-        // Between two spans the chance grows to that of the longer one, before the shortest to that of it.
+        // Between two spans the chance grows to that of the longer one, before the shortest to that of it; where readings are days apart the first
+        // ones go by a later one.
+        let are_far = self.scales.base_days > FAR_APART_DAYS.0;
+        let first = if are_far { FIRST_SPANS } else { 0 };
         let mut counted = spans(&self.scales)
-            .take_while(|(power, span)| *power == 0 || *span < 2.0 * days)
+            .take_while(|(power, span)| *power <= first || *span < 2.0 * days)
             .map(|(_, span)| self.most(span));
         let later = self.later.as_ref();
         counted.any(|most| most >= chance)

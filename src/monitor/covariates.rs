@@ -5,6 +5,10 @@ use crate::reading::{Channel, CovariateKind, RunningTotal, Sample, Timestamp};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+/// Parts of the time are made half as long so often, while samples lie in few enough of them.
+const HALVINGS: u8 = 40;
+/// A running total rises so many times for each time that it is set back.
+const FALLS_A_RISE: usize = 10;
 /// Channels kept; a site that names more has a column for each of something else.
 const MOST_CHANNELS: usize = 64;
 
@@ -75,33 +79,32 @@ impl Covariates {
     }
 }
 
-/// Makes one of all samples within each part of the time, of which half as many as may be kept at most lie in the record: of amounts, as of
-/// rain, their sum, which came until the last of them; of a running total that last one; of all else the mean, a logger's code left out where
+/// Makes one of all samples within each part of the time, of which half as many as may be kept hold any: of amounts, as of
+/// rain, their sum, which came until the last of them; of a running total its last value; of all else the mean, a logger's code left out where
 /// there is more. Evenly over the whole record, or the older ones would seem to be far apart; and a power of two of seconds long, or they would
-/// be once more parts have been made of parts.
+/// be once more parts have been made of parts. What stands alone, as under a wrong date, takes one part.
 fn thin(channel: &mut Channel) {
-    let Some((first, last)) = channel.samples.first().zip(channel.samples.last()) else {
+    let samples = &channel.samples;
+    let Some((first, last)) = samples.first().zip(samples.last()) else {
         return;
     };
     let span = last.time.duration_since(first.time).as_secs_f64();
-    let part = (span / (MOST_SAMPLES / 2) as f64).log2().ceil().exp2();
-    let start = Timestamp::UNIX_EPOCH;
-    let place = |sample: &Sample| (sample.time.duration_since(start).as_secs_f64() / part).floor();
-    let is_same = |one: &Sample, next: &Sample| place(one).total_cmp(&place(next)).is_eq();
-    let parts = channel.samples.chunk_by(is_same);
-    let values: Vec<f64> = channel.samples.iter().map(|one| one.value).collect();
+    let longest = (span / (MOST_SAMPLES / 2) as f64).log2().ceil();
+    let parts = (0..HALVINGS).map(|halved| Parts((longest - f64::from(halved)).exp2()));
+    let few = parts.take_while(|parts| parts.of(samples).count() <= MOST_SAMPLES / 2);
+    let Some(parts) = few.last() else {
+        return;
+    };
     let is_rain = channel.kind() == CovariateKind::Rain;
-    let is_running = is_rain && RunningTotal::of(&values).is_some();
-    let merged = parts.filter_map(|part| {
+    let is_running = is_rain && is_running_total(samples);
+    let merged = parts.of(samples).filter_map(|part| {
         let (first, last) = (part.first()?, part.last()?);
+        let mut measured = part.iter().filter(|one| !is_code(one.value));
         if is_running {
-            return Some(*last);
+            return measured.next_back().or(Some(last)).copied();
         }
-        let measured = part
-            .iter()
-            .map(|one| one.value)
-            .filter(|one| !is_code(*one));
-        let (count, sum) = measured.fold((0.0, 0.0), |(n, sum), one| (n + 1.0, sum + one));
+        let values = measured.map(|one| one.value);
+        let (count, sum) = values.fold((0.0, 0.0), |(n, sum), one| (n + 1.0, sum + one));
         if count == 0.0 {
             return Some(*last);
         }
@@ -118,6 +121,37 @@ fn thin(channel: &mut Channel) {
         })
     });
     channel.samples = merged.collect();
+}
+
+/// Parts of the time, so many seconds long.
+struct Parts(f64);
+
+impl Parts {
+    fn of<'a>(&self, samples: &'a [Sample]) -> impl Iterator<Item = &'a [Sample]> {
+        let seconds = self.0;
+        let place = move |sample: &Sample| {
+            let since = sample.time.duration_since(Timestamp::UNIX_EPOCH);
+            (since.as_secs_f64() / seconds).floor()
+        };
+        samples.chunk_by(move |one, next| place(one).total_cmp(&place(next)).is_eq())
+    }
+}
+
+/// Whether rain is given as a running total, codes left out. In a dry spell, in which it hardly rises, it stands above zero, where amounts are
+/// mostly zero.
+fn is_running_total(samples: &[Sample]) -> bool {
+    let values = samples.iter().map(|one| one.value);
+    let values: Vec<f64> = values
+        .filter(|value| *value >= 0.0 && !is_code(*value))
+        .collect();
+    let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
+    let (rises, falls) = (
+        steps().filter(|step| *step > 0.0).count(),
+        steps().filter(|step| *step < 0.0).count(),
+    );
+    let above = values.iter().filter(|value| **value > 0.0).count();
+    let stands = above > values.len() / 2 && rises + falls < values.len() / 2;
+    RunningTotal::of(&values).is_some() || stands && falls * FALLS_A_RISE <= rises.max(FALLS_A_RISE)
 }
 
 #[cfg(test)]
@@ -182,6 +216,36 @@ mod tests {
             lake.samples.last().unwrap().time,
             sample(3600 * 87_659, 0.0).time
         );
+    }
+
+    #[test]
+    fn a_running_total_with_a_code_or_in_a_dry_spell_stays_one() {
+        let with_a_code = |hour: i64| {
+            if hour == 500 {
+                -9999.0
+            } else {
+                (hour / 100) as f64
+            }
+        };
+        let in_a_drought = |hour: i64| 812.4 + f64::from(u8::from(hour > 60_000));
+        for (total, last) in [
+            (ten_years("rain_mm", with_a_code), 876.0),
+            (ten_years("rain_mm", in_a_drought), 813.4),
+        ] {
+            let samples = total.samples.iter().filter(|one| !is_code(one.value));
+            let highest = samples.map(|one| one.value).fold(0.0, f64::max);
+            assert!((highest - last).abs() < 1e-9, "{highest} of {last}");
+        }
+    }
+
+    #[test]
+    fn a_sample_of_a_wrong_date_takes_one_part_and_no_more() {
+        let mut covariates = Covariates::default();
+        covariates.take(("lake_m", None), None, sample(0, 1.0));
+        for hour in 400_000..420_000 {
+            covariates.take(("lake_m", None), None, sample(3600 * hour, 1.0));
+        }
+        assert!(covariates.list()[0].samples.len() > MOST_SAMPLES / 8);
     }
 
     #[test]

@@ -53,6 +53,9 @@ pub(super) struct Silence {
     /// So many came in time since.
     #[serde(default)]
     in_time: u8,
+    /// Whether the newest batch came so late that one is missing.
+    #[serde(default)]
+    has_missed: bool,
 }
 
 impl Silence {
@@ -69,7 +72,7 @@ impl Silence {
             self.note_gap(newest, spacing);
             self.note_lost(spacing);
             let most = self
-                .allowed()
+                .allowed_in_time()
                 .and_then(|allowed| allowed.checked_mul(MAY_SKIP));
             let most = most.filter(|_| self.silent).unwrap_or(spacing);
             self.spacings.push_back(spacing.min(most));
@@ -82,6 +85,7 @@ impl Silence {
 
     /// As [`Silence::broken_by`]; how long that took says nothing of the usual spacing.
     pub(super) fn broken_after_maintenance_by(&mut self, time: Timestamp) -> Option<Timestamp> {
+        self.delay = None;
         if self.newest.is_some_and(|newest| time <= newest) {
             return None;
         }
@@ -143,12 +147,18 @@ impl Silence {
             return;
         };
         if delay <= usual {
-            self.in_time += 1;
+            self.in_time = self.in_time.saturating_add(1);
             if self.in_time >= IN_TIME {
                 self.delays.clear();
             }
         } else if spacing <= usual {
             self.in_time = 0;
+            // An upload that was missed once makes no other rhythm.
+            let is_missed = self.between_batches().is_some_and(|most| delay > most);
+            if is_missed && !std::mem::replace(&mut self.has_missed, true) {
+                return;
+            }
+            self.has_missed = false;
             self.delays.push_back(delay);
             let old = self.delays.len().saturating_sub(BATCHES);
             self.delays.drain(..old);

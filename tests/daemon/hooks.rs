@@ -479,6 +479,15 @@ async fn a_red_waits_for_no_run_of_a_lesser_alert_that_hangs() {
     // Its own orange is given some seconds to end, so that messages come in their order.
     offer("4", Level::Red);
     eventually("the red of the fourth", || calls().contains("4 red")).await;
+    // The end of a red comes before the orange that follows on it, also where no run for less is free.
+    let mut end = alert_at("6", Level::Red, AlertState::Resolved);
+    end.key = "6/red".to_owned();
+    assert!(dispatcher.offer(&end));
+    offer("6", Level::Orange);
+    eventually("the orange after a red", || calls().contains("6 orange")).await;
+    let of_the_sixth = calls();
+    let of_the_sixth = of_the_sixth.lines().filter(|line| line.starts_with('6'));
+    assert_eq!(of_the_sixth.collect::<Vec<&str>>(), ["6 red", "6 orange"]);
     assert!(dispatcher.close(Duration::ZERO).await.is_none());
 }
 

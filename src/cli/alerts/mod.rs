@@ -218,11 +218,17 @@ fn needs_an_alert(store: &Store, order: &Order) -> anyhow::Result<()> {
                 anyhow::bail!("no level is in force {shown}: there is nothing to resolve");
             }
         }
-        Order::Shelve { benchmark, .. } => {
-            let is_unknown = here
-                .next()
-                .is_some_and(|(_, level)| *level == Level::Unknown);
-            if is_unknown && here.next().is_none() {
+        Order::Shelve {
+            benchmark, until, ..
+        } => {
+            let levels: Vec<Level> = here.map(|(_, level)| *level).collect();
+            let is_long = until.duration_since(clock::now()) > Order::LONGEST_SILENCE;
+            if levels.contains(&Level::Red) && is_long {
+                anyhow::bail!(
+                    "red is in force {shown}, which is shelved for seven days at most: the next red is not reported either"
+                );
+            }
+            if levels == [Level::Unknown] {
                 anyhow::bail!(
                     "only unknown is in force {shown}, which is not shelved: `slipwatch alerts silence --benchmark {benchmark}` \
                      holds back everything of it"

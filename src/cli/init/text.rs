@@ -57,6 +57,18 @@ pub(super) fn config(plan: &InitPlan) -> String {
     text
 }
 
+/// What follows the file of one day.
+fn dated_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPlan) {
+    if let Some(pattern) = dated::of_one_day(&source.path, &plan.benchmarks) {
+        let _ = writeln!(
+            text,
+            "# The file's name has a date. If another file begins each day: path = {}, and in [[benchmark]] an id without the\n\
+             # date and column = \"NAME\", its column's name in the header.",
+            quoted(&pattern)
+        );
+    }
+}
+
 fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPlan) {
     let _ = write!(
         text,
@@ -70,14 +82,7 @@ fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPla
         source.kind.name(),
         quoted(&source.path)
     );
-    if let Some(pattern) = dated::of_one_day(&source.path, &plan.benchmarks) {
-        let _ = writeln!(
-            text,
-            "# The file's name has a date. If another file begins each day: path = {}, and in [[benchmark]] an id without the\n\
-             # date and column = \"NAME\", its column's name in the header.",
-            quoted(&pattern)
-        );
-    }
+    dated_lines(text, source, plan);
     let named = source.zone.as_ref().and_then(|zone| zone.iana_name());
     let zone = plan.zone.as_deref().or(named);
     if let Some(zone) = zone.filter(|_| source.kind != SourceKind::Mcap) {

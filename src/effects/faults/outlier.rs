@@ -34,7 +34,7 @@ const FIRST_ALL_AT_ONCE: f64 = 3.0;
 const LEADS_UP: f64 = 2.0;
 /// Of rain and of a river: fewest values above zero, and how many times the next largest a value is that cannot be.
 const FEWEST_FALLS: usize = 20;
-const BEYOND_ANY_PEAK: f64 = 100.0;
+const BEYOND_ANY_PEAK: f64 = 300.0;
 /// Outliers are few; where there are more, the noise has heavy tails and none is a mistake.
 const FEW: f64 = 0.02;
 

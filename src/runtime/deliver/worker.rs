@@ -29,7 +29,7 @@ const LOOK_AGAIN_MUTED: Duration = Duration::from_secs(1);
 const MOST_AT_ONCE: usize = 4;
 /// So many more of red and orange: runs for less that hang keep none of them waiting.
 const MORE_OF_THE_GRAVE: usize = 2;
-/// A run that lasts longer than this does not keep a graver alert of its own benchmark waiting either.
+/// A run that lasts longer than this does not keep a graver alert of its own benchmark waiting either, and is broken off for it; the run of an end does.
 const KEEPS_WAITING: Duration = Duration::from_secs(10);
 
 #[derive(Debug)]
@@ -85,14 +85,14 @@ type Turn = (Instant, u64);
 
 /// The turn of `waiting`, or of an end at its place that came before it and has not been tried: a receiver that goes by the order takes
 /// the newest message for what holds. An end that has failed once keeps nothing waiting.
-fn end_before(turn: &Turn, waiting: &Waiting, free: &[(&Turn, &Waiting)]) -> Turn {
+fn end_before(turn: &Turn, waiting: &Waiting, due: &[(&Turn, &Waiting)]) -> Turn {
     let is_before = |(other, end): &&(&Turn, &Waiting)| {
         end.is_new
             && end.alert.state == MessageState::Resolved
             && other.1 < turn.1
             && place(&end.alert) == place(&waiting.alert)
     };
-    let mut ends = free.iter().filter(is_before);
+    let mut ends = due.iter().filter(is_before);
     if waiting.alert.state != MessageState::Firing {
         return *turn;
     }
@@ -152,7 +152,7 @@ impl Worker {
             if !open && self.running.is_empty() {
                 return self.lost;
             }
-            let due = self.next_due();
+            let due = self.next_due(open);
             tokio::select! {
                 biased;
                 alert = queue.recv(), if open && self.untried < QUEUE => match alert {
@@ -168,10 +168,12 @@ impl Worker {
         }
     }
 
-    /// When the next one may be started.
-    fn next_due(&self) -> Option<Instant> {
+    /// When the next one may be started; on the way out all are due.
+    fn next_due(&self, open: bool) -> Option<Instant> {
         let waiting = self.waiting.iter();
-        let each = waiting.filter_map(|((due, _), one)| self.free_from(*due, one));
+        let now = clock::later(Duration::ZERO);
+        let due = |due: Instant| if open { due } else { now };
+        let each = waiting.filter_map(|((at, _), one)| self.free_from(due(*at), one));
         each.min()
     }
 
@@ -187,8 +189,9 @@ impl Worker {
             .iter()
             .filter(|run| place(&run.waiting.alert) == place(&waiting.alert));
         at_its_place.try_fold(due, |from, run| {
-            let is_graver = is_grave && gravity(&waiting.alert) > gravity(&run.waiting.alert);
-            is_graver.then(|| from.max(run.started + KEEPS_WAITING))
+            let of_less = run.waiting.alert.state == MessageState::Firing
+                && gravity(&waiting.alert) > gravity(&run.waiting.alert);
+            (is_grave && of_less).then(|| from.max(run.started + KEEPS_WAITING))
         })
     }
 
@@ -199,22 +202,23 @@ impl Worker {
         let now = clock::later(Duration::ZERO);
         let due = self.waiting.iter();
         let due = due.take_while(|((due, _), _)| !open || *due <= now);
-        let due = due.filter(|(_, waiting)| !waiting.is_held);
-        let is_free = |(_, waiting): &(&Turn, &Waiting)| {
+        let due: Vec<(&Turn, &Waiting)> = due.filter(|(_, waiting)| !waiting.is_held).collect();
+        let is_free = |(_, waiting): &&(&Turn, &Waiting)| {
             let from = self.free_from(now, waiting);
             from.is_some_and(|from| from <= now)
         };
-        let free: Vec<(&Turn, &Waiting)> = due.filter(is_free).collect();
-        let next = free.iter().max_by_key(|((due, number), waiting)| {
+        let free = due.iter().filter(is_free);
+        let next = free.max_by_key(|((due, number), waiting)| {
             (gravity(&waiting.alert), std::cmp::Reverse((*due, *number)))
         });
-        let Some(turn) = next.map(|(turn, waiting)| end_before(turn, waiting, &free)) else {
+        let Some(turn) = next.map(|(turn, waiting)| end_before(turn, waiting, &due)) else {
             return false;
         };
         let Some(waiting) = self.waiting.remove(&turn) else {
             return false;
         };
         self.untried -= usize::from(waiting.is_new);
+        self.break_off(&waiting.alert);
         locked(&self.in_hand).is_tried(&waiting.alert);
         let (hook, alert) = (Arc::clone(&self.hook), waiting.alert.clone());
         let task = tokio::spawn(self.runner.run(hook, alert, waiting.attempt));
@@ -224,6 +228,15 @@ impl Worker {
             started: now,
         });
         true
+    }
+
+    /// Ends the runs for less at the place of a graver alert that does not wait for them any more: what they say would come after it.
+    fn break_off(&mut self, graver: &Alert) {
+        let is_there = |run: &mut Running| place(&run.waiting.alert) == place(graver);
+        let broken_off: Vec<Running> = self.running.extract_if(.., is_there).collect();
+        for run in broken_off {
+            self.drop_over(&run.waiting.alert);
+        }
     }
 
     /// Of what is due: what waits for its escalation, for somebody on duty or for the end of a silence waits on.

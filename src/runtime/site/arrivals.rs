@@ -287,10 +287,9 @@ impl Site {
         let is_noted = noted.is_some_and(|noted| time.duration_since(noted).abs() < NOTED_FOR);
         let is_late = time.duration_since(arrival.time) > NOTED_FOR;
         // Where the time that was noted proves wrong, the reading is none of a backlog.
-        let is_news = !is_noted && (is_late || noted.is_some());
-        let is_learnt =
-            self.monitor.is_silent(benchmark) || self.monitor.comes_in_batches(benchmark);
-        if is_live && is_news && is_learnt {
+        let in_batches = self.monitor.comes_in_batches(benchmark);
+        let is_news = !is_noted && (is_late || noted.is_some() || in_batches);
+        if is_live && is_news && (in_batches || self.monitor.is_silent(benchmark)) {
             let benchmark = benchmark.clone();
             let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
             self.step(now, &Input::Notice(Notice::Behind { benchmark, time }));

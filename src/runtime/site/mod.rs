@@ -252,6 +252,7 @@ impl Site {
             let since = self.called_since(last, order.benchmark())?;
             order.was_given_before(since);
         }
+        self.shorten(&mut order);
         self.batch.taken(left.number);
         tracing::warn!(?order, "people ask for something");
         let now = self.data_now();

@@ -115,19 +115,6 @@ impl Mutes {
     }
 }
 
-/// Until when `level` is shelved, which somebody asked for `until`: of a red no longer than a silence may last, as the next red, which may be
-/// the true one, is not reported either.
-fn shelved_until(level: Level, until: Timestamp, given_at: Option<Timestamp>) -> Timestamp {
-    let latest = given_at.and_then(|given| given.checked_add(Order::LONGEST_SILENCE).ok());
-    match latest.filter(|_| level == Level::Red) {
-        Some(latest) if latest < until => {
-            tracing::warn!(%latest, asked = %until, "red is shelved for seven days at most");
-            latest
-        }
-        Some(_) | None => until,
-    }
-}
-
 /// Says in the log which of those that stood before stand no more: also one that ran out by itself.
 pub(in crate::runtime) fn announce_ends(before: &[Mute], now: &[Mute]) {
     for mute in before.iter().filter(|mute| !now.contains(mute)) {
@@ -143,6 +130,25 @@ pub(in crate::runtime) fn announce_ends(before: &[Mute], now: &[Mute]) {
 }
 
 impl Site {
+    /// A red is shelved no longer than a silence may last: the next red, which may be the true one, is not reported either.
+    pub(super) fn shorten(&self, order: &mut Order) {
+        let Order::Shelve {
+            benchmark,
+            until,
+            given,
+        } = order
+        else {
+            return;
+        };
+        let latest = given
+            .given_at
+            .and_then(|at| at.checked_add(Order::LONGEST_SILENCE).ok());
+        let is_red = self.level_before(benchmark, &given.called_since) == Level::Red;
+        *until = latest
+            .filter(|_| is_red)
+            .map_or(*until, |latest| latest.min(*until));
+    }
+
     /// Does what people ask for, as far as it concerns who is notified.
     pub(super) fn apply(&mut self, order: &Order) {
         match order {
@@ -177,8 +183,7 @@ impl Site {
                 given,
             } => {
                 let level = self.level_before(benchmark, &given.called_since);
-                let until = shelved_until(level, *until, given.given_at);
-                self.mute((Some(benchmark), Some(level)), until, given.given_at);
+                self.mute((Some(benchmark), Some(level)), *until, given.given_at);
             }
             Order::Silence {
                 benchmark,

@@ -15,9 +15,13 @@ use std::io;
 use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Bytes before the offset that are compared as a whole when the file has changed: an export that is written again in place keeps its last rows.
 const EARLIER_BYTES: u64 = 256 * 1024;
+/// How long an export may take to be written, and how soon a file is read from its start again for it.
+const WRITTEN: Duration = Duration::from_secs(2);
+const ANEW_AGAIN: Duration = Duration::from_secs(600);
 /// Bytes of text that are read at once.
 const READ_BYTES: usize = 16 * 1024;
 /// Bytes before the offset that must not change.
@@ -46,6 +50,10 @@ pub(super) struct FileTail {
     pub(super) mark: Vec<u8>,
     /// A hash of the bytes before the offset, [`EARLIER_BYTES`] at most; none while there is more to read.
     pub(super) earlier: Option<u64>,
+    /// Runs since that was found to be another one now.
+    other_since: Option<Stopwatch>,
+    /// Runs since it was read from its start for that.
+    read_anew: Option<Stopwatch>,
     /// As of the last look that found nothing more; the file is opened only when it differs.
     pub(super) idle: Option<Glance>,
     /// When it was last written to, as of the last read.
@@ -146,6 +154,8 @@ impl FileTail {
             place: None,
             mark: Vec::new(),
             earlier: None,
+            other_since: None,
+            read_anew: None,
             idle: None,
             modified: (0, 0),
             changed: None,
@@ -282,6 +292,7 @@ impl FileTail {
             // Known values are dropped as repeated.
             tracing::info!(file = %self.path.display(), at = self.at, "what had been read of it is another text now: read from its start");
             self.begin_anew();
+            self.read_anew = Some(Stopwatch::start());
         }
         self.place = Some(glance.place);
         self.modified = glance.modified;
@@ -302,7 +313,7 @@ impl FileTail {
         // A suspect record is looked at again although nothing changes any more.
         let suspect =
             matches!(self.content, Content::Mcap { suspect: Some(at), .. } if at == self.at);
-        self.idle = (!moved && !suspect).then_some(glance);
+        self.idle = (!moved && !suspect && self.other_since.is_none()).then_some(glance);
         Ok(moved)
     }
 
@@ -334,13 +345,22 @@ impl FileTail {
         self.header_before = self.header();
         self.content = Content::of(&self.decoder, &self.origin);
         self.at = 0;
-        self.earlier = None;
+        (self.earlier, self.other_since) = (None, None);
     }
 
     /// Whether rows that have been read stand there otherwise, as in an export written over the one before; what has left its name is read on.
-    fn is_rewritten(&self, file: &File) -> io::Result<bool> {
-        let known = self.earlier.filter(|_| self.departed.is_none());
-        known.map_or(Ok(false), |known| Ok(self.hash_of_earlier(file)? != known))
+    /// Only once whoever writes it has had the time to, and not again at once: some programs count in the header what they append.
+    fn is_rewritten(&mut self, file: &File) -> io::Result<bool> {
+        let Some(known) = self.earlier.filter(|_| self.departed.is_none()) else {
+            return Ok(false);
+        };
+        if self.other_since.is_none() && self.hash_of_earlier(file)? != known {
+            self.other_since = Some(Stopwatch::start());
+        }
+        let is_written =
+            (self.other_since.as_ref()).is_some_and(|since| since.elapsed() >= WRITTEN);
+        let is_again = (self.read_anew.as_ref()).is_some_and(|since| since.elapsed() < ANEW_AGAIN);
+        Ok(is_written && !is_again)
     }
 
     fn hash_of_earlier(&self, file: &File) -> io::Result<u64> {

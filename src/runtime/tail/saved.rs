@@ -90,7 +90,8 @@ impl FileTail {
 
     /// Everything up to here has been handed out.
     pub(super) fn mark_handed_out(&mut self) {
-        if self.safe.at == self.at && self.safe.place == self.place && self.safe.mark == self.mark {
+        let is_there = self.safe.at == self.at && self.safe.place == self.place;
+        if is_there && self.safe.mark == self.mark && self.safe.earlier == self.earlier {
             return;
         }
         let content = match &self.content {

@@ -55,7 +55,7 @@ impl DataQuality {
         let mut events = Vec::new();
         let evidence = |kind: Suspicion| found.iter().find(|one| one.kind == kind);
         let mut kinds = [Suspicion::Mark, Suspicion::Fall, Suspicion::Scale];
-        // Where one suspicion takes the place of another the alert goes on.
+        // Where one suspicion takes the place of another the benchmark stays unknown, under another alert.
         kinds.sort_by_key(|kind| evidence(*kind).is_none());
         for kind in kinds {
             let evidence = evidence(kind);

@@ -94,7 +94,11 @@ impl DataQuality {
         unknown.named = Some(reason);
         // A sensor that is found stuck at the reading after which it was silent is another alert than the silence.
         let is_other = unknown.before.is_none_or(|before| since > before);
-        let since = if is_other { since } else { now };
+        let since = if is_other {
+            since
+        } else {
+            another_since(unknown.before, now)
+        };
         unknown.since = Some(since);
         let state = AlertState::Firing;
         Some(alert(record, now, since, state, reason, text))
