@@ -58,6 +58,8 @@ const EVACUATIONS_AHEAD: i32 = 2;
 const COURSE_PART: i32 = 2;
 const MEAN_ODDS: f64 = 2.0 / 3.0;
 const ODDS_AT_ONCE: f64 = 4.0;
+/// After so many of these parts a value has lost all but a fiftieth of its weight.
+const COURSES: i32 = 4;
 /// Red that is pending calls orange when the mean has come to odds of this share.
 const NEAR_ODDS: f64 = 1.0 / 7.0;
 /// Red was in force of late within so many of the times that a slope must be steady. Slopes pause for 2 to 10 days before they collapse.
@@ -88,6 +90,11 @@ impl Policy {
     /// Over what time the mean chance is taken that calls red: each value counts the less by a factor of e after so long.
     pub fn red_course(&self) -> SignedDuration {
         self.evacuation_time / COURSE_PART
+    }
+
+    /// After so long a value hardly counts in that mean any more.
+    pub fn red_course_fades(&self) -> SignedDuration {
+        self.red_course().saturating_mul(COURSES)
     }
 
     /// The mean chance over [`Policy::red_course`] that calls red beside [`Policy::red_chance`].

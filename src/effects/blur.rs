@@ -5,7 +5,6 @@ use super::act::Act;
 use super::candidates;
 use super::judge::coefficients;
 use super::kind::Kind;
-use super::noise::Whitener;
 use super::refit::{Fitted, Start, refit};
 use super::search::{Accepted, Refitted, SIGNIFICANT, Search};
 use super::term::Term;
@@ -88,11 +87,7 @@ impl Search<'_> {
 
     /// The best event of each kind where every reading is a mean over so many spacings to begin with.
     fn under_a_mean(&mut self, base: &Fitted, mean: &Term, spacings: f64) -> Vec<Refitted> {
-        let own = self.bank.iter();
-        let own: Vec<Whitener> = own
-            .filter(|whitener| whitener.noise == base.noise)
-            .cloned()
-            .collect();
+        let own = self.whiteners_of(base.noise);
         let start = Start {
             frozen: 1,
             ..Start::at(base).with_size(mean, spacings)

@@ -23,8 +23,6 @@ const HALVINGS: usize = 2;
 const HELPS: f64 = 0.05;
 /// The shortest delay that is tried, spacings of the covariate; none becomes this when it is made longer.
 pub(super) const SHORTEST: f64 = 0.3;
-/// No response remembers more than this share of the record.
-const MOST_MEMORY: f64 = 0.5;
 
 impl Search<'_> {
     /// `term` with its response's mean delay so many days; `None` of what has no response, and beyond the delays that are tried.
@@ -35,7 +33,7 @@ impl Search<'_> {
         };
         let driver = Driver::at(self.drivers, term.channel)?;
         let is_tried = mean_days >= SHORTEST * driver.step()
-            && response.memory_days() <= MOST_MEMORY * self.problem.span();
+            && !response.outlasts_half_of(self.problem.span());
         if !is_tried {
             return None;
         }
@@ -105,9 +103,7 @@ impl Search<'_> {
         let mut start = Start::at(fitted);
         *start.terms.last_mut()? = self.with_its_derivative(term)?;
         start.parameters.push(0.0);
-        let own = self.bank.iter();
-        let own = own.filter(|whitener| whitener.noise == fitted.noise);
-        let own: Vec<Whitener> = own.cloned().collect();
+        let own = self.whiteners_of(fitted.noise);
         let mut there = refit(self.problem, &start, &own, &mut self.scratch)?;
         let (by_delay, gain) = (there.parameters.pop()?, *there.parameters.last()?);
         let mut by = (by_delay / gain).clamp(-FARTHEST, FARTHEST);

@@ -73,7 +73,7 @@ pub(super) fn objection(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) 
     let term = fitted.terms.last()?;
     let own = newest_coefficients(fitted);
     if let Some(response) = term.response
-        && response.memory_days() > 0.5 * problem.span()
+        && response.outlasts_half_of(problem.span())
     {
         return Some(format!(
             "its memory of {:.0} days is over half the record",

@@ -356,11 +356,7 @@ impl<'a> Search<'a> {
                 let mut start = Start::at(fitted);
                 start.terms.pop();
                 start.terms.push(term);
-                let own = self.bank.iter();
-                let bank: Vec<Whitener> = own
-                    .filter(|whitener| whitener.noise == fitted.noise)
-                    .cloned()
-                    .collect();
+                let bank = self.whiteners_of(fitted.noise);
                 match refit(self.problem, &start, &bank, &mut self.scratch) {
                     Some(next) if next.bic(self.problem) < fitted.bic(self.problem) - 0.05 => {
                         *fitted = next;

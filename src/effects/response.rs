@@ -62,6 +62,11 @@ impl Response {
         let quantile = if self.stages == 1 { 2.9957 } else { 2.3719 };
         quantile * self.mean_days
     }
+
+    /// Whether it remembers more than half of a record of so many days.
+    pub(super) fn outlasts_half_of(&self, span_days: f64) -> bool {
+        self.memory_days() > 0.5 * span_days
+    }
 }
 
 impl Driver {

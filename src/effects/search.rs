@@ -11,7 +11,7 @@ use super::judge::{
     step_errors,
 };
 use super::kind::Kind;
-use super::noise::Whitener;
+use super::noise::{Noise, Whitener};
 use super::objection::{Judgement, Objection, ObjectionWeight};
 use super::options::Options;
 use super::problem::Problem;
@@ -223,6 +223,12 @@ impl Search<'_> {
             refit_every_memory(self.problem, start, self.bank, &mut self.scratch)
         });
         fits.min_by(|a, b| a.bic(self.problem).total_cmp(&b.bic(self.problem)))
+    }
+
+    /// The whiteners of that noise.
+    pub(super) fn whiteners_of(&self, noise: Noise) -> Vec<Whitener> {
+        let own = self.bank.iter().filter(|one| one.noise == noise);
+        own.cloned().collect()
     }
 
     /// Adds effects to the plain law until none earns its place.

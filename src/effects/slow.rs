@@ -6,7 +6,6 @@ use super::act::Act;
 use super::candidates::{once, slow};
 use super::explanation::Candidate;
 use super::kind::Kind;
-use super::noise::Whitener;
 use super::problem::Problem;
 use super::refit::{Fitted, Start, likeliest, refit};
 use super::rival::Rival;
@@ -267,8 +266,7 @@ impl Search<'_> {
         stride: f64,
     ) -> Option<(Fitted, SlowLoad)> {
         let problem = self.problem;
-        let own = self.bank.iter().filter(|one| one.noise == fitted.noise);
-        let own: Vec<Whitener> = own.cloned().collect();
+        let own = self.whiteners_of(fitted.noise);
         let beside = load.beside(stride).into_iter();
         let each = beside.filter(|other| other.is_within(problem));
         let each = each.filter_map(|other| {

@@ -7,8 +7,6 @@ use std::collections::BTreeMap;
 
 /// Parts of the time are made half as long so often, while samples lie in few enough of them.
 const HALVINGS: u8 = 40;
-/// A running total rises so many times for each time that it is set back.
-const FALLS_A_RISE: usize = 10;
 /// Channels kept; a site that names more has a column for each of something else.
 const MOST_CHANNELS: usize = 64;
 
@@ -137,21 +135,11 @@ impl Parts {
     }
 }
 
-/// Whether rain is given as a running total, codes left out. In a dry spell, in which it hardly rises, it stands above zero, where amounts are
-/// mostly zero.
+/// Whether rain is given as a running total, codes left out.
 fn is_running_total(samples: &[Sample]) -> bool {
     let values = samples.iter().map(|one| one.value);
-    let values: Vec<f64> = values
-        .filter(|value| *value >= 0.0 && !is_code(*value))
-        .collect();
-    let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
-    let (rises, falls) = (
-        steps().filter(|step| *step > 0.0).count(),
-        steps().filter(|step| *step < 0.0).count(),
-    );
-    let above = values.iter().filter(|value| **value > 0.0).count();
-    let stands = above > values.len() / 2 && rises + falls < values.len() / 2;
-    RunningTotal::of(&values).is_some() || stands && falls * FALLS_A_RISE <= rises.max(FALLS_A_RISE)
+    let measured = values.filter(|value| *value >= 0.0 && !is_code(*value));
+    RunningTotal::is_one_or_stands(&measured.collect::<Vec<f64>>())
 }
 
 #[cfg(test)]

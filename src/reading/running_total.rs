@@ -39,6 +39,17 @@ impl RunningTotal {
         }
         (rises >= FEWEST_RISES && falls * RISES_A_FALL <= rises).then_some(Self { set_back })
     }
+
+    /// Whether values of rain are a running total, or may be one in a dry spell: it hardly rises then and stands above zero, where amounts are
+    /// mostly zero.
+    pub fn is_one_or_stands(values: &[f64]) -> bool {
+        let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
+        let rises = steps().filter(|step| *step > 0.0).count();
+        let falls = steps().filter(|step| *step < 0.0).count();
+        let above = values.iter().filter(|value| **value > 0.0).count();
+        let stands = above > values.len() / 2 && rises + falls < values.len() / 2;
+        Self::of(values).is_some() || stands && falls * RISES_A_FALL <= rises.max(FEWEST_RISES)
+    }
 }
 
 #[cfg(test)]

@@ -19,9 +19,7 @@ const MOST_READINGS: usize = 2000;
 const ALL_FOR: SignedDuration = SignedDuration::from_hours(90 * 24);
 /// The rule of a level that comes from the past.
 pub(in crate::monitor) const PAST: &str = "past";
-/// Before the reading that is judged first the course of the chance that calls red is begun so many of its spans earlier, with so many
-/// readings of each judged.
-const COURSES: i32 = 4;
+/// Before the reading that is judged first the course of the chance that calls red is begun, with so many readings of each of its spans judged.
 const JUDGED_A_COURSE: i32 = 12;
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 
@@ -98,7 +96,7 @@ impl Track {
             return;
         }
         let (mut earlier, mut context) = (self.past(time).track, *context);
-        let Ok(mut next) = time.checked_sub(policy.red_course().saturating_mul(COURSES)) else {
+        let Ok(mut next) = time.checked_sub(policy.red_course_fades()) else {
             return;
         };
         let readings = self.record.observations().values.iter();

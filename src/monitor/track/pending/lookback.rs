@@ -17,9 +17,8 @@ use std::ops::Range;
 
 /// Forecasts of one look back, over the readings as they were and as they are.
 const MOST_FORECASTS: usize = 64;
-/// Forecasts by which the mean chance that calls red begins, over so many of its spans.
+/// Forecasts by which the mean chance that calls red begins.
 const MOST_BEFORE: usize = 24;
-const COURSES: f64 = 4.0;
 
 /// What came late since the last newest reading.
 #[derive(Debug, Serialize, Deserialize)]
@@ -130,7 +129,7 @@ fn highest(
             highest = highest.max(latch.level());
         }
     };
-    let course = COURSES * days(policy.red_course());
+    let course = days(policy.red_course_fades());
     let begins = values.partition_point(|one| one.t_days < since - course);
     for index in newest_of(begins..first, MOST_BEFORE) {
         after(index, false);
