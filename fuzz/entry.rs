@@ -63,13 +63,8 @@ pub(crate) fn mcap(bytes: &[u8]) {
         rest = next;
         let messages = opcode.map(|opcode| channels.decode(opcode, body));
         for message in messages.into_iter().flatten().flatten().flatten() {
-            let payload = &message.payload;
-            let decoded = decode_message(
-                &message.topic,
-                &message.metadata,
-                message.publish_time,
-                payload,
-            );
+            let (time, payload) = (message.publish_time, &message.payload);
+            let decoded = decode_message(message.channel(), time, payload);
             if let Ok(Some(item)) = decoded {
                 check(&item);
             }

@@ -115,8 +115,6 @@ const LONGEST_FILE: usize = 500;
 
 /// Arguments of a function, as in clippy.toml; the members of a tuple count each.
 const MOST_ARGUMENTS: usize = 7;
-/// Functions that take more: of two states with their covariances, and of a whole course.
-const WITH_MORE: [&str; 3] = ["effect", "smooth_pair", "voight"];
 
 /// Names of types that stand more than once: the flags of each command.
 const NAMED_TWICE: [&str; 1] = ["Args"];
@@ -158,11 +156,18 @@ fn module_of(file: &Path) -> Vec<String> {
         .collect()
 }
 
-/// The text up to the module of tests that closes it.
+/// The text up to the module of tests that closes it. One that lies in a file of its own ends nothing.
 fn without_tests(text: &str) -> &str {
+    let opens_tests = |at: usize| {
+        let rest = text[at..].trim_start().strip_prefix("mod ");
+        rest.is_some_and(|rest| {
+            let opens = rest.find(['{', ';']);
+            opens.is_some_and(|at| rest[at..].starts_with('{'))
+        })
+    };
     let tests = text
         .match_indices("#[cfg(test)]")
-        .find(|(at, mark)| text[at + mark.len()..].trim_start().starts_with("mod "));
+        .find(|(at, mark)| opens_tests(at + mark.len()));
     tests.map_or(text, |(at, _)| &text[..at])
 }
 
@@ -382,12 +387,38 @@ fn the_table_of_arrows_is_as_strict_as_the_code() {
     assert!(idle.is_empty(), "{idle:#?}");
 }
 
-/// The file of the crate that `path`, as it stands in `module`, leads into: the deepest module on it.
-fn file_of(
-    module: &[String],
-    path: &[String],
-    modules: &BTreeSet<Vec<String>>,
-) -> Option<Vec<String>> {
+/// The modules, and where what a folder's `mod.rs` takes from a file in it stands: by the folder and the name.
+struct Modules {
+    all: BTreeSet<Vec<String>>,
+    taken: BTreeMap<(Vec<String>, String), Vec<String>>,
+}
+
+impl Modules {
+    fn of(sources: &[Source]) -> Self {
+        let all = sources.iter().map(|one| one.module.clone()).collect();
+        let mut modules = Self {
+            all,
+            taken: BTreeMap::new(),
+        };
+        for source in sources {
+            for path in paths(&source.text) {
+                let (at, name) = (file_of(&source.module, &path, &modules), path.last());
+                if let (Some(at), Some(name)) = (at, name)
+                    && at.len() > source.module.len()
+                    && at.starts_with(&source.module)
+                {
+                    let key = (source.module.clone(), name.clone());
+                    modules.taken.insert(key, at);
+                }
+            }
+        }
+        modules
+    }
+}
+
+/// The file of the crate that `path`, as it stands in `module`, leads into: the deepest module on it, or the one from which that
+/// has the name.
+fn file_of(module: &[String], path: &[String], modules: &Modules) -> Option<Vec<String>> {
     let (mut at, rest) = match path.first().map(String::as_str) {
         Some("crate") => (Vec::new(), &path[1..]),
         Some("super" | "self") => {
@@ -401,8 +432,11 @@ fn file_of(
     let start = at.len();
     for name in rest {
         at.push(name.clone());
-        if !modules.contains(&at) {
+        if !modules.all.contains(&at) {
             at.pop();
+            if let Some(taken) = modules.taken.get(&(at.clone(), name.clone())) {
+                return Some(taken.clone());
+            }
             break;
         }
     }
@@ -412,7 +446,7 @@ fn file_of(
 /// Pairs of files of one module of which each names the other; not what a folder's `mod.rs` has to do with the files
 /// in it.
 fn mutual(sources: &[Source]) -> Vec<String> {
-    let modules: BTreeSet<Vec<String>> = sources.iter().map(|one| one.module.clone()).collect();
+    let modules = Modules::of(sources);
     let mut named: BTreeSet<(Vec<String>, Vec<String>)> = BTreeSet::new();
     for source in sources {
         for path in paths(&source.text) {
@@ -545,7 +579,7 @@ fn no_function_takes_more_arguments_by_putting_them_into_tuples() {
     let mut wrong = Vec::new();
     for source in sources() {
         for (name, count) in functions(&source.text) {
-            if count > MOST_ARGUMENTS && !WITH_MORE.contains(&name.as_str()) {
+            if count > MOST_ARGUMENTS {
                 wrong.push(format!("{}: {name}, {count}", source.file.display()));
             }
         }
@@ -672,6 +706,8 @@ mod the_reader_of_sources {
     fn leaves_out_the_tests_and_nothing_else() {
         let text = "#[cfg(test)]\nuse a;\nfn f() {}\n#[cfg(test)]\nmod tests {}\n";
         assert_eq!(without_tests(text), "#[cfg(test)]\nuse a;\nfn f() {}\n");
+        let elsewhere = "#[cfg(test)]\nmod fixture;\nmod b;\nfn f() {}\n";
+        assert_eq!(without_tests(elsewhere), elsewhere);
         assert_eq!(module_of(Path::new("fit/rates.rs")), ["fit", "rates"]);
         assert_eq!(module_of(Path::new("fit/mod.rs")), ["fit"]);
         assert!(module_of(Path::new("lib.rs")).is_empty());

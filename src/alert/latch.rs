@@ -1,6 +1,6 @@
-//! The level in force: it rises with the evidence, and falls on observed motion alone.
+//! The level in force: it rises with the evidence, and falls where motion that was measured and what is called both allow it.
 //!
-//! A forecast that changes its mind does not lower a level. What does: the slope has slowed to half the
+//! A lower forecast alone does not lower a level. What does: the slope has slowed to half the
 //! highest velocity seen at this level, without gaining, for a whole evacuation time in which the evidence
 //! called for less, and no chance calls orange where it is red; or it has been seen to hold a velocity under the critical one, without gaining, for the
 //! stated time, and is no faster than when the level was called, or than half of the highest velocity while no chance calls orange, or nothing is called any
@@ -165,6 +165,11 @@ impl Latch {
     /// The level in force.
     pub fn level(&self) -> Level {
         self.level
+    }
+
+    /// Whether a level, or a higher one, has been called and is in force no more.
+    pub fn has_ended(&self, level: Level) -> bool {
+        self.level < level && self.newest.keys().any(|called| *called >= level)
     }
 
     /// The level above green that is in force, and since when.
@@ -363,6 +368,7 @@ mod tests {
     fn what_was_measured_before_a_level_was_called_does_not_end_it_and_other_units_do_not_hold_it()
     {
         let (policy, latch) = red_at_hundred();
+        assert!(!latch.has_ended(Level::Red));
         // As where the readings were metres taken for millimetres, and all come again.
         let mut latch = latch.measured_otherwise();
         for hours in -200..0 {
@@ -376,6 +382,7 @@ mod tests {
         // No sooner than motion without a gain ends a level, and no later.
         let steady = policy.steady_for.as_hours();
         assert_eq!((ended, latch.level()), (Some(steady), Level::Green));
+        assert!(latch.has_ended(Level::Red) && latch.has_ended(Level::Orange));
     }
 
     #[test]

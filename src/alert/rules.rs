@@ -118,3 +118,13 @@ impl Threshold {
             .map(|(rule, ..)| rule)
     }
 }
+/// Whether a rule rests on motion that was measured, and on no forecast.
+pub fn is_observed(rule: &str) -> bool {
+    [
+        "critical-velocity",
+        "velocity-threshold",
+        "displacement-threshold",
+        "acceleration-threshold",
+    ]
+    .contains(&rule)
+}

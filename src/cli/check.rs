@@ -28,9 +28,9 @@ pub(super) struct Args {
     output: OutputArgs,
 }
 
-/// What is fed by nothing.
+/// What has no source.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: fed by nothing, see the warnings: {}", config.display(), what.join(", "))]
+#[error("{}: without a source, see the warnings: {}", config.display(), what.join(", "))]
 struct Unwatched {
     config: PathBuf,
     what: Vec<String>,

@@ -174,7 +174,7 @@ fn summary(report: &FitReport) -> TextTable {
     let failure = &report.failure_time;
     let line = &report.inverse_velocity;
     let mut table = TextTable::plain();
-    // First what the monitor goes by.
+    // First what the monitor uses.
     match &report.regime_under_load {
         Some(regime) => {
             table.row(["regime".to_owned(), shown(regime)]);
@@ -265,7 +265,7 @@ fn notes(report: &FitReport, is_held: bool) -> String {
 const COLUMNS: usize = 118;
 
 /// What is said where the two regimes differ.
-pub(super) const REGIMES_DIFFER: &str = "The two regimes differ. The first lets the load change, and is what the monitor goes by; go by it too. The\n\
+pub(super) const REGIMES_DIFFER: &str = "The two regimes differ. The first lets the load change, and is what the monitor uses; use it too. The\n\
      second, the parameters and the minima take the load for constant over the whole record.\n";
 
 /// What is said where m is.

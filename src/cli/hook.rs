@@ -1,4 +1,4 @@
-//! `hook test`: a drill for a site's hooks. `hook exec`: what the daemon starts to run a hook within walls.
+//! `hook test`: a drill for a site's hooks. `hook exec`: what the daemon starts to run a hook that may write only where it is allowed to.
 
 use super::args::{OutputArgs, OutputFormat};
 use super::run::asynchronous;

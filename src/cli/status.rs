@@ -380,7 +380,7 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     let legend = "collapse: median of the forecast; chance: of collapse within twice the\n\
                   evacuation time (or red_within) of the next reading, by which red is called";
     let alerts = listed("in force", &status.alerts, zone)
-        + &listed("ended, and acknowledged by nobody", &status.returned, zone);
+        + &listed("ended, not acknowledged", &status.returned, zone);
     format!("{}\n{table}{legend}\n{}", folded(&head), folded(&alerts))
 }
 

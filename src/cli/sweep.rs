@@ -123,11 +123,11 @@ fn text(report: &SweepReport) -> String {
 
 /// What is said where the regimes differ after the velocity has stood still alone.
 const STOOD_STILL: &str = "The two regimes differ where the velocity stood still over the last third of the readings: these do not decide between\n\
-     them. The first, which lets the load change, is what the monitor goes by.\n";
+     them. The first, which lets the load change, is what the monitor uses.\n";
 
 fn cells(row: &SweepRow) -> [String; 15] {
     let percent = |share: Option<f64>| share.map_or("-".to_owned(), percent_in_words);
-    // First what the monitor goes by.
+    // First what the monitor uses.
     let (first, second) = match &row.regime_under_load {
         Some(load) => (load, Some(&row.regime)),
         None => (&row.regime, None),

@@ -45,7 +45,7 @@ pub(super) fn ca_file_where(section: &mut Section<'_>, is_secured: bool) -> Opti
     if !is_secured {
         section.error(
             &given.at,
-            format!("{} without TLS trusts nobody", section.path("ca_file")),
+            format!("{} is not used without TLS", section.path("ca_file")),
             "leave it out, or write an address with TLS: https:// or mqtts://",
         );
     }

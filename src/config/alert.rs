@@ -6,6 +6,13 @@ use super::value;
 use crate::alert::{Level, Policy, Threshold};
 use jiff::SignedDuration;
 
+/// From a chance that is higher than this hardly a collapse is called in time (docs/false-alarms.md).
+const HIGHEST_CHANCE_OF_RED: f64 = 0.5;
+/// Nor is orange, which is to come before red, with one that is higher than this.
+const HIGHEST_CHANCE_OF_ORANGE: f64 = 0.95;
+/// Slopes creep faster than this for years, and few are ever read as fast as that before they collapse, mm/day.
+const USUAL_CRITICAL_VELOCITIES: std::ops::RangeInclusive<f64> = 1.0..=100_000.0;
+
 /// Reads the table over `base`, whose figures stand where the table gives none.
 pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
     let evacuation_time = section.parsed("evacuation_time", value::duration);
@@ -35,6 +42,7 @@ pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
         rules: rule::rules(&mut section, &base.rules),
     };
     warn(&section, &policy, evacuation_time.as_ref());
+    warn_of_unusual(&section, &policy);
     section.finish();
     policy
 }
@@ -121,6 +129,47 @@ fn warn(section: &Section<'_>, policy: &Policy, evacuation_time: Option<&Placed<
                 "let a graver level begin at a larger figure",
             );
         }
+    }
+}
+
+/// Figures of this table with which a level says little, or nothing.
+fn warn_of_unusual(section: &Section<'_>, policy: &Policy) {
+    let usual = Policy::default();
+    let chances = [
+        (
+            "red_chance",
+            policy.red_chance,
+            usual.red_chance,
+            HIGHEST_CHANCE_OF_RED,
+        ),
+        (
+            "orange_chance",
+            policy.orange_chance,
+            usual.orange_chance,
+            HIGHEST_CHANCE_OF_ORANGE,
+        ),
+    ];
+    for (key, chance, usual, highest) in chances {
+        if section.has(key) && chance > highest {
+            section.warning(
+                section.at(),
+                format!("{key} {chance} is so high that few collapses are called in time"),
+                format!("leave it out: it is {usual} then"),
+            );
+        }
+    }
+    let critical = policy.critical_velocity_mm_per_day;
+    if section.has("critical_velocity") && !USUAL_CRITICAL_VELOCITIES.contains(&critical) {
+        let why = if critical < *USUAL_CRITICAL_VELOCITIES.start() {
+            "slopes creep faster than that for years"
+        } else {
+            "few slopes are ever read at such a velocity before they collapse"
+        };
+        section.warning(
+            section.at(),
+            format!("critical_velocity {critical} mm/day: {why}"),
+            "write the velocity from which this site counts as failed, such as \"1 m/day\"",
+        );
     }
 }
 

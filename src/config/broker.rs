@@ -91,7 +91,7 @@ pub(super) fn broker(
     {
         section.error(
             &given.at,
-            "source.ca_file without TLS trusts nobody".to_owned(),
+            "source.ca_file is not used without TLS".to_owned(),
             "leave it out, or write url = \"mqtts://...\"",
         );
     }

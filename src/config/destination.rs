@@ -3,6 +3,7 @@
 use std::any::Any;
 use std::fmt::Debug;
 use std::ops::Deref;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// What one table of the config says of where its alerts go; how they are sent there is a row of
@@ -18,6 +19,11 @@ pub trait Destination: Any + Debug + Send + Sync {
     /// of another too.
     fn goes_by_keys(&self) -> bool {
         false
+    }
+
+    /// The files whose content it takes when it is set up.
+    fn reads(&self) -> Vec<PathBuf> {
+        Vec::new()
     }
 
     /// What it needs and this machine does not have, for `check`.

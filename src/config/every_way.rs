@@ -5,11 +5,14 @@ use super::table::Section;
 use super::{ExtraMessages, HookConfig, SharedDestination, value};
 use crate::alert::Level;
 use crate::reading::BenchmarkId;
+use jiff::SignedDuration;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
 const TIMEOUT: Duration = Duration::from_secs(10);
+/// An attempt that may take longer than this keeps those after it waiting.
+const LONG_TIMEOUT: SignedDuration = SignedDuration::from_mins(15);
 
 /// What all ways out have in common.
 pub(super) struct Common {
@@ -69,6 +72,17 @@ pub(super) fn common(section: &mut Section<'_>) -> Common {
     }
     let benchmarks = benchmarks.map_or_else(Vec::new, |given| given.value);
     let timeout = section.parsed("timeout", value::duration);
+    if let Some(given) = timeout.as_ref().filter(|given| given.value > LONG_TIMEOUT) {
+        section.warning(
+            &given.at,
+            format!(
+                "{} {:#}: while an attempt hangs for so long, it is not repeated and alerts after it wait",
+                section.path("timeout"),
+                given.value
+            ),
+            "write how long an attempt takes at most, such as \"30s\"",
+        );
+    }
     let escalate_after = section.parsed("escalate_after", value::duration);
     Common {
         levels: levels(section),

@@ -50,8 +50,8 @@ pub use vector::Vector;
 pub use webhook::{Webhook, WebhookFormat};
 
 use crate::alert::Level;
-use crate::monitor::Settings;
-use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Timestamp, Unit};
+use crate::monitor::{Settings, WRITTEN};
+use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, SummerTime, Timestamp, Unit};
 use jiff::SignedDuration;
 use problem::ConfigProblems;
 use std::cell::RefCell;
@@ -183,7 +183,7 @@ pub struct Benchmark {
 impl Benchmark {
     /// What decides which numbers its readings are, in words that stay the same from version to version: with other ones they mean
     /// something else.
-    pub fn read_as(&self, conventions: &Conventions, epoch: Option<Timestamp>) -> String {
+    pub fn read_as(&self, source: &str) -> String {
         let mut words = Vec::new();
         words.extend(
             self.column
@@ -206,20 +206,72 @@ impl Benchmark {
             .averaging
             .map(|span| format!("averaging {} s", span.as_secs()));
         words.extend(span);
-        let source = read_without_a_name(conventions, epoch);
-        words.extend(Some(source).filter(|source| !source.is_empty()));
-        words.join(", ")
+        let own = words.join(", ");
+        match (own.as_str(), source) {
+            ("", source) => source.to_owned(),
+            (own, "") => own.to_owned(),
+            (own, source) if source.starts_with(WRITTEN) => format!("{own}{source}"),
+            (own, source) => format!("{own}, {source}"),
+        }
     }
 }
 
-/// The same of whatever comes from a source without a `[[benchmark]]`.
-fn read_without_a_name(conventions: &Conventions, epoch: Option<Timestamp>) -> String {
-    let mut words = Vec::new();
+impl FileSource {
+    /// The same of whatever comes from the source, and how its files are written, where that is not as usual. How many lines stand before the
+    /// header is not of it: without that no row is read at all.
+    pub fn read_as(&self) -> String {
+        let mut times = zone_in_words(&self.conventions);
+        times.extend(self.epoch.map(|epoch| format!("day 0 on {epoch}")));
+        let mut words = Vec::new();
+        let usual = Dialect::default();
+        let dialect = &self.dialect;
+        let mut other = |is_other: bool, text: String| words.extend(is_other.then_some(text));
+        let clock = self.conventions.clock.summer_time;
+        other(clock != SummerTime::default(), format!("dst {clock:?}"));
+        let missing = self.conventions.missing.in_words();
+        other(!missing.is_empty(), format!("missing {missing}"));
+        other(
+            dialect.decimal != usual.decimal,
+            format!("decimal {:?}", dialect.decimal),
+        );
+        other(
+            dialect.thousands != usual.thousands,
+            format!("thousands {:?}", dialect.thousands),
+        );
+        other(
+            dialect.delimiter != usual.delimiter,
+            format!("delimiter {:?}", dialect.delimiter),
+        );
+        other(
+            dialect.time_columns != usual.time_columns,
+            format!("time columns {:?}", dialect.time_columns),
+        );
+        other(
+            dialect.time_format != usual.time_format,
+            format!("time format {:?}", dialect.time_format),
+        );
+        let written = if words.is_empty() {
+            "as usual".to_owned()
+        } else {
+            format!("with {}", words.join(", "))
+        };
+        format!("{}{WRITTEN}{written}", times.join(", "))
+    }
+}
+
+impl Broker {
+    /// The same of its messages, which nobody can read again: only what makes their times others.
+    fn read_as(&self) -> String {
+        zone_in_words(&self.conventions).join(", ")
+    }
+}
+
+fn zone_in_words(conventions: &Conventions) -> Vec<String> {
     let zone = conventions.clock.zone.as_ref();
     let zone = zone.and_then(jiff::tz::TimeZone::iana_name);
-    words.extend(zone.map(|zone| format!("time zone {zone}")));
-    words.extend(epoch.map(|epoch| format!("day 0 on {epoch}")));
-    words.join(", ")
+    zone.map(|zone| format!("time zone {zone}"))
+        .into_iter()
+        .collect()
 }
 
 /// What reaches a hook only where it asks for it.
@@ -260,7 +312,7 @@ pub struct HookConfig {
     pub sandbox: bool,
     /// Where else it may write.
     pub writable: Vec<PathBuf>,
-    /// This program, which walls itself in and then becomes the hook; without it there are no walls.
+    /// This program, which limits where it may write and then becomes the hook; without it there is no limit.
     pub launcher: Option<PathBuf>,
 }
 
@@ -310,8 +362,8 @@ fn read(file: &Path) -> io::Result<String> {
 /// # Errors
 /// [`ConfigError::Invalid`] with every problem found.
 pub fn parse(text: &str, file: &Path) -> Result<Config, ConfigError> {
-    let (config, notebook) = taken(text, file);
-    let problems = notebook.close();
+    let (config, found) = taken(text, file);
+    let problems = found.close();
     let refused = problems
         .iter()
         .any(|problem| problem.severity == Severity::Error);
@@ -341,28 +393,28 @@ fn is_table(text: &str) -> bool {
 }
 
 fn taken(text: &str, file: &Path) -> (Option<Config>, ConfigProblems) {
-    let notebook = RefCell::new(ConfigProblems::new(file, text));
+    let problems = RefCell::new(ConfigProblems::new(file, text));
     let (document, syntax) = toml::de::DeTable::parse_recoverable(text);
     if !syntax.is_empty() && is_table(text) {
         let problem = "it looks like a table of readings, not like the config of a site".to_owned();
         let expected = "write its config with slipwatch init FILE, and give that";
-        notebook.borrow_mut().error(&(0..0), problem, expected);
-        return (None, notebook.into_inner());
+        problems.borrow_mut().error(&(0..0), problem, expected);
+        return (None, problems.into_inner());
     }
     for error in &syntax {
         let at = error.span().unwrap_or(0..0);
         let message = error.message().replace('\n', ", ");
-        notebook
+        problems
             .borrow_mut()
             .error(&at, message, "write it as TOML 1.0 asks");
     }
     let config = if syntax.is_empty() {
-        let mut root = Section::root(document.get_ref(), &notebook);
+        let mut root = Section::root(document.get_ref(), &problems);
         let config = section::document(&mut root, file);
         root.finish();
         config
     } else {
         None
     };
-    (config, notebook.into_inner())
+    (config, problems.into_inner())
 }

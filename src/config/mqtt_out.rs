@@ -31,6 +31,10 @@ impl Destination for MqttTopic {
         self.name.clone()
     }
 
+    fn reads(&self) -> Vec<PathBuf> {
+        self.ca_file.iter().cloned().collect()
+    }
+
     fn lacks(&self) -> Option<String> {
         address::unreadable(self.ca_file.as_ref()?)
     }

@@ -3,11 +3,11 @@
 use super::table::{Placed, Section, unique};
 use super::{
     Benchmark, Broker, Config, FileSource, SiteConfig, alert, covariate, declared, drill,
-    heartbeat, hook, link, read_without_a_name, record, source, value, vector,
+    heartbeat, hook, link, record, source, value, vector,
 };
 use crate::alert::Policy;
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
-use crate::reading::{BenchmarkId, Conventions, Quantity, Suspicion, Timestamp, Unit};
+use crate::reading::{BenchmarkId, Quantity, Suspicion, Unit};
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
 use std::collections::{BTreeMap, BTreeSet};
@@ -78,7 +78,7 @@ fn site(mut section: Section<'_>, base: &Path, sources: &[FileSource]) -> Option
             .map_err(|_| "write an address and a port: \"127.0.0.1:8642\"".to_owned())
     });
     let token_file = section.text("token_file");
-    refuse_open_door(&section, listen.as_ref(), token_file.is_some());
+    refuse_listening_without_token(&section, listen.as_ref(), token_file.is_some());
     let time_zone = section.parsed("time_zone", value::time_zone);
     let keep_refits = section.parsed("keep_refits", value::duration);
     let record = record::record(&mut section, base);
@@ -117,7 +117,11 @@ fn site_level(section: &mut Section<'_>) -> SiteLevel {
 }
 
 /// Whoever can reach the daemon over a network must know a secret.
-fn refuse_open_door(section: &Section<'_>, listen: Option<&Placed<SocketAddr>>, has_token: bool) {
+fn refuse_listening_without_token(
+    section: &Section<'_>,
+    listen: Option<&Placed<SocketAddr>>,
+    has_token: bool,
+) {
     if let Some(listen) = listen
         && !listen.value.ip().is_loopback()
         && !has_token
@@ -154,24 +158,19 @@ fn explain(mut section: Section<'_>) -> Explain {
 
 /// Where every source has benchmarks of its own, no others are watched.
 fn watched(sources: &[FileSource], brokers: &[Broker], benchmarks: &[Benchmark]) -> Watched {
-    let of_files = sources
-        .iter()
-        .map(|one| (&one.id, &one.conventions, one.epoch));
-    let of_brokers = brokers.iter().map(|one| (&one.id, &one.conventions, None));
-    let known: Vec<(&String, &Conventions, Option<Timestamp>)> =
-        of_files.chain(of_brokers).collect();
-    let names_its_own = |(source, ..): &(&String, _, _)| {
+    let of_files = sources.iter().map(|one| (&one.id, one.read_as()));
+    let of_brokers = brokers.iter().map(|one| (&one.id, one.read_as()));
+    let known: Vec<(&String, String)> = of_files.chain(of_brokers).collect();
+    let names_its_own = |(source, _): &(&String, String)| {
         let mut sources = benchmarks.iter().map(|one| &one.source);
         sources.any(|one| one == *source)
     };
     let read_as = benchmarks.iter().filter_map(|benchmark| {
-        let source = known.iter().find(|(id, ..)| **id == benchmark.source);
-        let (_, conventions, epoch) = source?;
-        Some((benchmark.id.clone(), benchmark.read_as(conventions, *epoch)))
+        let source = known.iter().find(|(id, _)| **id == benchmark.source);
+        Some((benchmark.id.clone(), benchmark.read_as(&source?.1)))
     });
     let open = known.iter().filter(|source| !names_its_own(source));
-    let open = open
-        .map(|(id, conventions, epoch)| ((*id).clone(), read_without_a_name(conventions, *epoch)));
+    let open = open.map(|(id, read_as)| ((*id).clone(), read_as.clone()));
     Watched {
         named: benchmarks.iter().map(|one| one.id.clone()).collect(),
         is_open: !known.iter().all(names_its_own),

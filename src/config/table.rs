@@ -22,18 +22,18 @@ pub(super) struct Section<'t> {
     table: Option<&'t DeTable<'t>>,
     at: Range<usize>,
     asked: Vec<Key>,
-    notebook: &'t RefCell<ConfigProblems>,
+    problems: &'t RefCell<ConfigProblems>,
 }
 
 impl<'t> Section<'t> {
     /// The whole document.
-    pub(super) fn root(table: &'t DeTable<'t>, notebook: &'t RefCell<ConfigProblems>) -> Self {
+    pub(super) fn root(table: &'t DeTable<'t>, problems: &'t RefCell<ConfigProblems>) -> Self {
         Self {
             name: "",
             table: Some(table),
             at: 0..0,
             asked: Vec::new(),
-            notebook,
+            problems,
         }
     }
 
@@ -48,17 +48,17 @@ impl<'t> Section<'t> {
     }
 
     pub(super) fn error(&self, at: &Range<usize>, what: String, fix: impl Into<String>) {
-        self.notebook.borrow_mut().error(at, what, fix);
+        self.problems.borrow_mut().error(at, what, fix);
     }
 
     /// A warning that is given only where something else bears it out.
     pub(super) fn doubt(&self, at: &Range<usize>, what: String, fix: &str) -> ConfigProblem {
-        let notebook = self.notebook.borrow();
-        notebook.problem(Severity::Warning, at, what, fix.to_owned())
+        let problems = self.problems.borrow();
+        problems.problem(Severity::Warning, at, what, fix.to_owned())
     }
 
     pub(super) fn warning(&self, at: &Range<usize>, what: String, fix: impl Into<String>) {
-        self.notebook.borrow_mut().warning(at, what, fix);
+        self.problems.borrow_mut().warning(at, what, fix);
     }
 
     /// `alert.outlook`, as messages name it.
@@ -331,13 +331,13 @@ impl<'t> Section<'t> {
             table,
             at,
             asked: Vec::new(),
-            notebook: self.notebook,
+            problems: self.problems,
         }
     }
 
     /// Reports the keys that nothing asked for.
     pub(super) fn finish(self) {
-        self.notebook.borrow_mut().keys.add(self.name, &self.asked);
+        self.problems.borrow_mut().keys.add(self.name, &self.asked);
         let Some(table) = self.table else { return };
         for (key, _) in table {
             let name: &str = key.get_ref();

@@ -54,6 +54,11 @@ impl Destination for Webhook {
         self.format == WebhookFormat::Alertmanager
     }
 
+    fn reads(&self) -> Vec<PathBuf> {
+        let files = [&self.secret_file, &self.ca_file];
+        files.into_iter().flatten().cloned().collect()
+    }
+
     fn lacks(&self) -> Option<String> {
         let secret = self.secret_file.as_deref();
         let secret = secret.and_then(|file| Secret::read(file).err());

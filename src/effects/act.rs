@@ -78,13 +78,18 @@ pub(super) fn amplitudes(coefficients: &[f64]) -> impl Iterator<Item = f64> {
     })
 }
 
-/// The same values with mean 0 and standard deviation 1; `None` where they do not change.
-pub(super) fn standardise(mut values: Vec<f64>) -> Option<Vec<f64>> {
+/// The mean, and the standard deviation about it.
+pub(super) fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n;
+    (mean, variance.sqrt())
+}
+
+/// The same values with mean 0 and standard deviation 1; `None` where they do not change.
+pub(super) fn standardise(mut values: Vec<f64>) -> Option<Vec<f64>> {
+    let (mean, deviation) = mean_and_deviation(&values);
     let size = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    let deviation = variance.sqrt();
     if !(deviation.is_finite() && deviation > 1e-9 * size) {
         return None;
     }

@@ -114,6 +114,7 @@ pub(super) fn responses(form: Form, delays: &[f64]) -> Vec<Response> {
                 form,
                 stages,
                 mean_days,
+                before: 0.0,
             });
         }
     }
@@ -253,6 +254,7 @@ pub(super) fn in_reading(
         form,
         stages,
         mean_days,
+        before: 0.0,
     };
     let column = driver.respond(response, &problem.t)?;
     Some(Term {

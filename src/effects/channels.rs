@@ -131,6 +131,7 @@ fn moves_as_the_readings_do(problem: &Problem, channel: &Channel, driver: &Drive
         form: Form::Level,
         stages: 1,
         mean_days: 0.0,
+        before: 0.0,
     };
     let values = driver.respond_in_unit(at_once, &problem.t);
     let pairs: Vec<(f64, f64)> = values.into_iter().zip(problem.y.iter().copied()).collect();

@@ -163,11 +163,15 @@ impl Search<'_> {
             1.0
         };
         if more < asked * self.options.bic_margin {
-            let less = -more;
-            self.note_slow(
-                &slow,
-                format!("an effect that was tried explains the same by {less:.0} more of the BIC"),
-            );
+            let why = if more <= 0.0 {
+                let less = -more;
+                format!("an effect that was tried explains the same by {less:.0} more of the BIC")
+            } else {
+                format!(
+                    "it cannot be separated from an effect that was tried: the BIC differs by {more:.0}"
+                )
+            };
+            self.note_slow(&slow, why);
             return None;
         }
         if more >= self.options.bic_margin
@@ -322,6 +326,24 @@ fn with_other_delays_beside(refitted: Vec<Refitted>) -> Vec<Refitted> {
     ordered
 }
 
+/// Of waves of the year in the reading that are larger than an instrument's and those of the load, which the BIC cannot separate, the ground's go first.
+fn prefer_the_ground(near: &mut [Refitted]) {
+    let waves_in = |one: &Refitted, place: LiesIn| {
+        let definition = one.term.kind.definition();
+        definition.lies_in == place && !definition.wave_periods.is_empty()
+    };
+    let too_large = |one: &Refitted| {
+        waves_in(one, LiesIn::Reading) && one.wave_amplitude() > MOST_OF_AN_INSTRUMENT_MM
+    };
+    let first = near.iter().position(too_large);
+    let of_the_ground = near.iter().position(|one| one.term.kind == Kind::SEASONAL);
+    if let (Some(first), Some(of_the_ground)) = (first, of_the_ground)
+        && first < of_the_ground
+    {
+        near[first..=of_the_ground].rotate_right(1);
+    }
+}
+
 /// Waves of the year in the reading go before a load that hardly changes the velocity, where the BIC cannot separate them or it follows the year:
 /// most instruments do so by a few millimetres, and a response with a long memory bends a little more than waves do. What
 /// follows the year so weakly is no rarer without any effect than the waves are. They go before any load that follows the year where they explain more.
@@ -366,6 +388,7 @@ fn prefer_independent_evidence(refitted: &mut [Refitted], margin: f64) {
             .then(simpler)
             .then(b.gain.total_cmp(&a.gain))
     });
+    prefer_the_ground(&mut refitted[..near]);
     prefer_the_reading(refitted, margin);
     let place = |is_so: fn(&Act) -> bool| refitted.iter().position(|one| is_so(&one.term.act));
     let step = place(|act| matches!(act, Act::Step));

@@ -8,10 +8,10 @@ use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::{Fitted, Start, towards};
 use super::term::{Scratch, Term};
-use crate::reading::{Timestamp, after_days};
+use crate::reading::{CHI_SQUARED_90, Timestamp, after_days};
 
 /// 90 % quantile of chi squared with one degree of freedom.
-const DROP: f64 = 2.71;
+const DROP: f64 = CHI_SQUARED_90;
 /// Most steps of one refit, which begins at that of a time nearby, and most refits on one side.
 const STEPS: usize = 6;
 const MOST_REFITS: usize = 24;

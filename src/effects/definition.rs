@@ -1,10 +1,7 @@
 //! What an effect is, in one value: its name and its words, how a search tries it, what supports it, and how its size is reported.
 
 use super::act::{Act, amplitudes, harmonics, standardise};
-use crate::reading::{CovariateKind, Quantity, Timestamp, Unit};
-
-/// One year, days.
-pub(super) const YEAR: f64 = 365.25;
+use crate::reading::{CovariateKind, DAYS_PER_YEAR, Quantity, Timestamp, Unit};
 
 /// What an effect is. One more is a file in `known` and a row in its table: what searches, judges, declares, reports and
 /// names effects goes by these fields.
@@ -29,7 +26,7 @@ pub struct EffectDefinition {
     /// Whether it says something of what comes, so that a later block of the readings has to speak for it.
     pub says_what_comes: bool,
     /// Days of the periods of its waves, where it is made of [`SearchedRecord::waves`] of these, or of the first of them: so far
-    /// as it has them, forecasts go by it. Empty for all others.
+    /// as it has them, forecasts use it. Empty for all others.
     pub wave_periods: &'static [f64],
     /// Its size as it is reported, from the coefficients of the fit.
     pub size: fn(&FittedCoefficients<'_>) -> EffectSize,
@@ -209,7 +206,7 @@ impl SearchedRecord<'_> {
 
     /// Whether two years have been seen, read often enough to show what comes and goes with them.
     pub fn shows_the_year(&self) -> bool {
-        self.span_days >= 1.95 * YEAR && self.spacing_days <= 0.2 * YEAR
+        self.span_days >= 1.95 * DAYS_PER_YEAR && self.spacing_days <= 0.2 * DAYS_PER_YEAR
     }
 }
 

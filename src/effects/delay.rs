@@ -3,11 +3,12 @@
 
 use super::act::Act;
 use super::candidates::once;
+use super::fresh::plain_starts;
 use super::kind::Kind;
 use super::linear::Linear;
 use super::margin::BY_SHAPE;
 use super::noise::{Noise, Whitener};
-use super::refit::{Fitted, Start, jacobian, likeliest, plain_starts, refit, towards};
+use super::refit::{Fitted, Start, jacobian, likeliest, refit, towards};
 use super::response::Driver;
 use super::search::{Refitted, Search};
 use super::term::Term;

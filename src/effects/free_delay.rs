@@ -3,12 +3,12 @@
 
 use super::act::Act;
 use super::candidates::with_response;
-use super::fresh::fresh_laws;
+use super::fresh::{AT_ONCE, fresh_laws};
 use super::noise::{Noise, Whitener};
-use super::refit::{AT_ONCE, Fitted, Start, likeliest, refit};
+use super::refit::{Fitted, Start, likeliest, refit};
 use super::response::{Driver, Response};
 use super::search::{Refitted, Search};
-use super::term::Term;
+use super::term::{Term, coefficients_of};
 
 /// Most steps of Gauss and Newton.
 const ROUNDS: usize = 8;
@@ -19,6 +19,8 @@ const FARTHEST: f64 = 0.5;
 const SETTLED: f64 = 0.01;
 /// A step that does not help is halved so many times.
 const HALVINGS: usize = 2;
+/// What had gathered before a covariate's first value is fitted where it counts at more readings than these.
+const FEWEST_EARLY: usize = 8;
 /// What a step must lower the BIC by.
 const HELPS: f64 = 0.05;
 /// The shortest delay that is tried, spacings of the covariate; none becomes this when it is made longer.
@@ -31,6 +33,12 @@ impl Search<'_> {
             mean_days,
             ..term.response?
         };
+        self.with_shape(term, response)
+    }
+
+    /// `term` with that response; `None` as above.
+    fn with_shape(&self, term: &Term, response: Response) -> Option<Term> {
+        let mean_days = response.mean_days;
         let driver = Driver::at(self.drivers, term.channel)?;
         let is_tried = mean_days >= SHORTEST * driver.step()
             && !response.outlasts_half_of(self.problem.span());
@@ -63,57 +71,118 @@ impl Search<'_> {
     }
 
     /// `one` with its delay free beside law and gain, from the law that it has and from one whose velocity answers to the load at once; `None`
-    /// where neither is nearer to the readings.
+    /// where none is nearer to the readings.
     fn with_free_delay(&mut self, base: &Fitted, one: &Refitted) -> Option<Refitted> {
         one.term.response.filter(|_| one.gain > 0.0)?;
         let mut followed = one.fitted.clone();
-        self.follow_delay(&mut followed);
-        let at_once = self.answering_at_once(base, &one.term);
-        let best = likeliest(self.problem, at_once.into_iter().chain([followed]))?;
+        self.follow_delay(&mut followed, false);
+        let at_once = [false, true].map(|holds| self.answering_at_once(base, &one.term, holds));
+        let all = at_once.into_iter().flatten().chain([followed]);
+        let best = likeliest(self.problem, all)?;
         let helps = best.bic(self.problem) < one.fitted.bic(self.problem) - HELPS;
         helps.then(|| self.known(base, best))?
     }
 
+    /// Moves the delays of the effects that `full` had before its newest one: they were found without it.
+    pub(super) fn settle_delays(&mut self, full: &mut Fitted) {
+        for index in 0..full.terms.len().saturating_sub(1) {
+            if full.terms[index].response.is_none() {
+                continue;
+            }
+            let last = full.terms.len() - 1;
+            let mut turned = self.with_term_moved(full, index, last);
+            self.follow_delay(&mut turned, false);
+            if turned.bic(self.problem) < full.bic(self.problem) - HELPS {
+                *full = self.with_term_moved(&turned, last, index);
+            }
+        }
+    }
+
+    /// The same with the term of one index at another.
+    fn with_term_moved(&self, fitted: &Fitted, from: usize, to: usize) -> Fitted {
+        let mut moved = fitted.clone();
+        let own = coefficients_of(self.problem, &moved.terms, from);
+        let own: Vec<f64> = moved.parameters.drain(own).collect();
+        let term = moved.terms.remove(from);
+        moved.terms.insert(to, term);
+        let place = coefficients_of(self.problem, &moved.terms, to).start;
+        moved.parameters.splice(place..place, own);
+        moved
+    }
+
     /// The joint fit with one more term from a law whose velocity answers to the load at once and that forgets nothing of it: from others a
-    /// fit seldom finds its way there, as these imitate the load themselves.
-    fn answering_at_once(&mut self, base: &Fitted, term: &Term) -> Option<Fitted> {
-        let laws = fresh_laws(self.problem, base, term);
+    /// fit seldom finds its way there, as these imitate the load themselves. Where its shape is held first, no law bends before the delay is right.
+    fn answering_at_once(
+        &mut self,
+        base: &Fitted,
+        term: &Term,
+        holds_shape: bool,
+    ) -> Option<Fitted> {
+        // What has no delay has no derivative by it either.
+        let driver = Driver::at(self.drivers, term.channel)?;
+        let has_none = term.response?.mean_days <= 0.0;
+        let shortest = has_none.then(|| self.with_mean_delay(term, SHORTEST * driver.step()));
+        let term = shortest.flatten().unwrap_or_else(|| term.clone());
+        let laws = fresh_laws(self.problem, base, &term);
         let white = [Whitener::new(self.problem, Noise::WHITE)];
-        let start = laws.get(AT_ONCE)?;
-        let mut fitted = refit(self.problem, start, &white, &mut self.scratch)?;
+        let start = Start {
+            holds_shape,
+            ..laws.into_iter().nth(AT_ONCE)?
+        };
+        let mut fitted = refit(self.problem, &start, &white, &mut self.scratch)?;
+        if holds_shape {
+            self.follow_delay(&mut fitted, true);
+            let free = Start::at(&fitted);
+            fitted = refit(self.problem, &free, &white, &mut self.scratch)?;
+        }
         self.sharpen(&mut fitted);
-        self.follow_delay(&mut fitted);
+        self.follow_delay(&mut fitted, false);
         Some(fitted)
     }
 
-    /// Moves the newest term's delay together with law and gain while that helps.
-    fn follow_delay(&mut self, fitted: &mut Fitted) {
+    /// Moves the newest term's delay, and what had gathered before its covariate's first value, together with law and gain while that helps.
+    fn follow_delay(&mut self, fitted: &mut Fitted, holds_shape: bool) {
         for _ in 0..ROUNDS {
-            match self.toward_its_delay(fitted) {
+            match self.toward_its_delay(fitted, holds_shape) {
                 Some(next) => *fitted = next,
                 None => break,
             }
         }
     }
 
-    /// One step of Gauss and Newton in the delay, the law and the gains; `None` where it does not help.
-    fn toward_its_delay(&mut self, fitted: &Fitted) -> Option<Fitted> {
+    /// One step of Gauss and Newton in the delay, the start, the law and the gains; `None` where it does not help.
+    fn toward_its_delay(&mut self, fitted: &Fitted, holds_shape: bool) -> Option<Fitted> {
         let term = fitted.terms.last()?;
-        let mean_days = term.response?.mean_days;
-        let mut start = Start::at(fitted);
-        *start.terms.last_mut()? = self.with_its_derivative(term)?;
-        start.parameters.push(0.0);
+        let response = term.response?;
+        let spread = Driver::at(self.drivers, term.channel)?.spread();
+        let derived = self.with_its_derivatives(term)?;
+        let count = derived.coefficients() - 1;
+        let mut start = Start {
+            holds_shape,
+            ..Start::at(fitted)
+        };
+        *start.terms.last_mut()? = derived;
+        start.parameters.extend(vec![0.0; count]);
         let own = self.whiteners_of(fitted.noise);
         let mut there = refit(self.problem, &start, &own, &mut self.scratch)?;
-        let (by_delay, gain) = (there.parameters.pop()?, *there.parameters.last()?);
-        let mut by = (by_delay / gain).clamp(-FARTHEST, FARTHEST);
+        let by = there.parameters.split_off(there.parameters.len() - count);
+        let gain = *there.parameters.last()?;
+        let by = |index: usize| by.get(index).map_or(0.0, |by| by / gain);
+        let mut step = (by(0).clamp(-FARTHEST, FARTHEST), by(1));
         for _ in 0..=HALVINGS {
-            if by.is_nan() || by.abs() < SETTLED {
+            if !step.0.is_finite() || step.0.abs().max(step.1.abs()) < SETTLED {
                 return None;
             }
-            let mut start = Start::at(&there);
-            let moved = self.with_mean_delay(term, mean_days * by.exp());
-            if let Some(moved) = moved {
+            let moved = Response {
+                mean_days: response.mean_days * step.0.exp(),
+                before: response.before + step.1 * spread,
+                ..response
+            };
+            if let Some(moved) = self.with_shape(term, moved) {
+                let mut start = Start {
+                    holds_shape,
+                    ..Start::at(&there)
+                };
                 *start.terms.last_mut()? = moved;
                 let next = refit(self.problem, &start, &own, &mut self.scratch);
                 let helps =
@@ -122,20 +191,35 @@ impl Search<'_> {
                     return Some(next);
                 }
             }
-            by *= 0.5;
+            step = (0.5 * step.0, 0.5 * step.1);
         }
         None
     }
 
-    /// The term with a second column: what its first one changes by per ln of the delay. `None` of what has no one column or no delay.
-    fn with_its_derivative(&self, term: &Term) -> Option<Term> {
-        let mean_days = term.response?.mean_days;
-        let nudged = self.with_mean_delay(term, mean_days * NUDGE.exp())?;
-        let (own, nudged) = (only_column(&term.act)?, only_column(&nudged.act)?);
-        let both = own.iter().zip(nudged);
-        let by_delay = both.map(|(own, nudged)| (nudged - own) / NUDGE).collect();
-        let columns = vec![own.to_vec(), by_delay];
-        let act = if matches!(term.act, Act::Load(_)) {
+    /// The term with more columns: what its first one changes by per ln of the delay and, where that counts, per standard deviation of the
+    /// covariate that had gathered before it. `None` of what has no one column or no delay.
+    fn with_its_derivatives(&self, term: &Term) -> Option<Term> {
+        let response = term.response?;
+        let driver = Driver::at(self.drivers, term.channel)?;
+        let early = *self.problem.t.get(FEWEST_EARLY)?;
+        let later = Response {
+            mean_days: response.mean_days * NUDGE.exp(),
+            ..response
+        };
+        let more = Response {
+            before: response.before + NUDGE * driver.spread(),
+            ..response
+        };
+        let is_of_load = matches!(term.act, Act::Load(_));
+        let counts = is_of_load && driver.remembers_its_start(response, early);
+        let own = only_column(&term.act)?;
+        let mut columns = vec![own.to_vec()];
+        for nudged in [Some(later), counts.then_some(more)].into_iter().flatten() {
+            let nudged = self.with_shape(term, nudged)?;
+            let both = own.iter().zip(only_column(&nudged.act)?);
+            columns.push(both.map(|(own, nudged)| (nudged - own) / NUDGE).collect());
+        }
+        let act = if is_of_load {
             Act::Load(columns)
         } else {
             Act::Reading(columns)

@@ -4,7 +4,7 @@
 use super::act::Act;
 use super::noise::{Noise, Whitener};
 use super::problem::{Problem, slips};
-use super::refit::{Fitted, Start, plain_starts, refit_from, towards};
+use super::refit::{Fitted, Start, refit_from, towards};
 use super::term::{Scratch, Term, law_parameters};
 use crate::reading::Quantity;
 
@@ -17,6 +17,48 @@ const EARLY: [f64; 4] = [0.1, 0.25, 0.5, 0.75];
 const GROWING: [f64; 7] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
 /// Fewest readings of an early law.
 const FEWEST_EARLY: usize = 12;
+
+/// Which of [`plain_starts`] answers to a load at once.
+pub(super) const AT_ONCE: usize = 1;
+
+/// Starts of the law alone: steady, steady and answering to a load at once, accelerating, relaxing from above and from below, soon there, and there within the first readings.
+pub(super) fn plain_starts(problem: &Problem) -> Vec<Start> {
+    let shapes = [
+        (0.0, -2.0, 0.0),
+        (0.0, -6.0, 0.0),
+        (0.8, -1.0, 0.3),
+        (0.95, -3.0, 0.0),
+        (-3.0, 1.0, -0.5),
+        (1.0, 2.0, -0.5),
+        (-20.0, 3.4, -0.8),
+        (-150.0, 5.2, -1.0),
+    ];
+    let used = problem.used;
+    let ends = (used / 5).max(2);
+    let early = match problem.quantity {
+        Quantity::Displacement => {
+            (problem.y[ends] - problem.y[0]) / (problem.t[ends] - problem.t[0])
+        }
+        Quantity::Velocity => problem.y[..ends].iter().sum::<f64>() / ends as f64,
+    };
+    let typical = problem.typical_velocity();
+    let early = early.clamp(0.01 * typical, 100.0 * typical);
+    let start = |(r, ln_a, p): (f64, f64, f64)| {
+        let velocity = if r == 0.0 { typical } else { early };
+        let mut parameters = vec![velocity.ln(), r, ln_a, p];
+        if problem.quantity == Quantity::Displacement {
+            parameters.push(problem.y[0]);
+        }
+        Start {
+            terms: Vec::new(),
+            parameters,
+            noise: Noise::WHITE,
+            frozen: 0,
+            holds_shape: false,
+        }
+    };
+    shapes.into_iter().map(start).collect()
+}
 
 /// Starts of the law with `terms`, at every size that they may start at.
 pub(super) fn fresh_starts(problem: &Problem, terms: &[Term]) -> Vec<Start> {

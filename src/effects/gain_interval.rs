@@ -1,6 +1,7 @@
 //! Between what values the gain of a covariate may lie: how far it can be moved, with the law, all other effects and its own delay free, before
 //! the law misses the readings by more than 90 % of the cases in which that is its gain.
 
+use super::act::Act;
 use super::candidates::with_response;
 use super::judge::coefficients;
 use super::noise::Whitener;
@@ -10,9 +11,10 @@ use super::ready::Ready;
 use super::refit::{Fitted, Start, jacobian, towards};
 use super::response::{Driver, Response};
 use super::term::{Scratch, Term, coefficients_of, law_parameters};
+use crate::reading::CHI_SQUARED_90;
 
 /// 90 % quantile of chi squared with one degree of freedom, and how near to it a bound is looked for.
-const DROP: f64 = 2.706;
+const DROP: f64 = CHI_SQUARED_90;
 const NEAR: f64 = 0.3;
 /// Most steps of one refit, which begins at that of a gain nearby, and most gains that are tried on one side.
 const STEPS: usize = 8;
@@ -41,7 +43,7 @@ pub(super) fn interval(
 ) -> Option<[f64; 2]> {
     let gain = *coefficients(&ready.problem, full, index).first()?;
     let whitener = ready.bank.iter().find(|one| one.noise == full.noise)?;
-    let start = with_last(&ready.problem, full, index)?;
+    let start = with_last(ready, full, index)?;
     let deviation = deviation(&ready.problem, full, whitener, (index, scratch))?;
     let mut profile = GainProfile {
         ready,
@@ -57,7 +59,8 @@ pub(super) fn interval(
 }
 
 /// `full` as a start, the term of that index the last, its coefficient held; `None` where it has several.
-fn with_last(problem: &Problem, full: &Fitted, index: usize) -> Option<Start> {
+fn with_last(ready: &Ready, full: &Fitted, index: usize) -> Option<Start> {
+    let problem = &ready.problem;
     let mut start = Start::at(full);
     let place = law_parameters(problem)
         + full.terms[..index]
@@ -66,9 +69,35 @@ fn with_last(problem: &Problem, full: &Fitted, index: usize) -> Option<Start> {
             .sum::<usize>();
     let term = start.terms.remove(index);
     let gain = start.parameters.remove(place);
-    (term.coefficients() == 1).then(|| Start {
+    if term.coefficients() != 1 {
+        return None;
+    }
+    if let Some(before) = what_gathered_before(ready, &term) {
+        start = start.with_size(&before, 0.0);
+    }
+    Some(Start {
         frozen: 1,
         ..start.with_size(&term, gain)
+    })
+}
+
+/// What more of what had gathered before its covariate's first value changes in `term`, as a term of its own; `None` where that was not fitted.
+fn what_gathered_before(ready: &Ready, term: &Term) -> Option<Term> {
+    let own = term.response.filter(|own| own.before != 0.0)?;
+    let driver = Driver::at(&ready.drivers, term.channel)?;
+    let more = Response {
+        before: own.before + driver.spread(),
+        ..own
+    };
+    let more = with_response(&ready.problem, term, driver, more)?;
+    let (Act::Load(own), Act::Load(more)) = (&term.act, more.act) else {
+        return None;
+    };
+    let both = own.first()?.iter().zip(more.first()?);
+    Some(Term {
+        response: None,
+        act: Act::Load(vec![both.map(|(own, more)| more - own).collect()]),
+        ..term.clone()
     })
 }
 
@@ -194,8 +223,8 @@ fn next(inside: (f64, f64), outside: Option<(f64, f64)>) -> f64 {
 mod tests {
     use super::super::candidates::in_load;
     use super::super::fixture::{channel, daily, generator, lake, normals, series};
+    use super::super::fresh::plain_starts;
     use super::super::kind::{Form, Kind};
-    use super::super::refit::plain_starts;
 
     use super::*;
     use crate::reading::Quantity;
@@ -252,6 +281,7 @@ mod tests {
             form: Form::Level,
             stages: 1,
             mean_days: 5.0,
+            before: 0.0,
         };
         let term = in_load(
             &ready.problem,

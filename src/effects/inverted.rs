@@ -32,6 +32,7 @@ pub(super) fn inverted_starts(problem: &Problem, scratch: &mut Scratch) -> Vec<S
                 parameters,
                 noise: Noise::WHITE,
                 frozen: 0,
+                holds_shape: false,
             }
         })
         .collect()

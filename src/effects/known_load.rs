@@ -1,6 +1,6 @@
 //! The law with its effects as forecasts use it: the known log-load at any time, and what is in the reading.
 
-use super::act::Act;
+use super::act::{Act, mean_and_deviation};
 use super::judge::coefficients;
 use super::kind::{Form, Kind};
 use super::problem::Problem;
@@ -256,6 +256,7 @@ impl Filtered {
             form: self.form,
             stages: self.stages,
             mean_days: self.mean_days,
+            before: 0.0,
         }
     }
 
@@ -344,16 +345,14 @@ fn filtered(term: &Term, drivers: &[Driver], nodes: &[f64]) -> Option<Filtered> 
     let driver = Driver::at(drivers, term.channel)?;
     let response = term.response?;
     let values = driver.respond_in_unit(response, nodes);
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n;
+    let (mean, deviation) = mean_and_deviation(&values);
     Some(Filtered {
         channel: driver.name.clone(),
         form: response.form,
         stages: response.stages,
         mean_days: response.mean_days,
         mean,
-        deviation: variance.sqrt(),
+        deviation,
     })
 }
 

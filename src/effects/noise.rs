@@ -5,6 +5,8 @@
 //! displacement sums up over time. Kalman's filter turns any column into innovations, and the likelihood
 //! follows from them; scaled by the white noise, of which the size is profiled out.
 
+mod smoother;
+
 use super::problem::Problem;
 use crate::reading::Quantity;
 
@@ -385,115 +387,6 @@ fn update(p: Covariance, reads: [f64; 2]) -> ([f64; 2], f64, Covariance) {
         (p[2] - gain[1] * cross[1]).max(0.0),
     ];
     (gain, variance, after)
-}
-
-impl Whitener {
-    /// Posterior (mean, variance) of what remembers, at every fitted reading, for a column in units of the white noise.
-    pub(super) fn smooth(&self, problem: &Problem, column: &[f64]) -> Vec<(f64, f64)> {
-        let stationary = f64::from(u8::from(self.noise.days.is_finite()));
-        let (mut mean, mut p): ([f64; 2], Covariance) = ([0.0; 2], [0.0, 0.0, stationary]);
-        let mut path = Vec::with_capacity(self.steps.len());
-        let typical = problem.typical_velocity();
-        for (i, step) in self.steps.iter().enumerate() {
-            let dt = since_last(problem, i);
-            let (gather, decay, q) = transition(problem, self.noise, dt, problem.seen[i] / typical);
-            let ahead = [mean[0] + gather * mean[1], decay * mean[1]];
-            let p_ahead = advance(p, gather, decay, q);
-            let (gain, _, after) = update(p_ahead, step.reads);
-            let off = column[i] * step.weight - step.reads[0] * ahead[0] - step.reads[1] * ahead[1];
-            mean = [ahead[0] + gain[0] * off, ahead[1] + gain[1] * off];
-            p = after;
-            path.push((gather, decay, ahead, p_ahead, mean, p));
-        }
-        backwards(&path)
-    }
-}
-
-/// (gather, decay, mean and covariance ahead, mean and covariance after) of one reading.
-type Passed = (f64, f64, [f64; 2], Covariance, [f64; 2], Covariance);
-
-/// The smoother's way back, from the filter's way forth.
-fn backwards(path: &[Passed]) -> Vec<(f64, f64)> {
-    let mut smoothed = vec![(0.0, 0.0); path.len()];
-    let mut later: Option<([f64; 2], Covariance)> = None;
-    for i in (0..path.len()).rev() {
-        let (_, _, _, _, mean, p) = path[i];
-        let (m, v) = match later {
-            None => (mean, p),
-            Some((m_later, v_later)) => {
-                let (gather, decay, ahead, p_ahead, _, _) = path[i + 1];
-                let determinant = p_ahead[0] * p_ahead[2] - p_ahead[1] * p_ahead[1];
-                if determinant <= 1e-12 * p_ahead[0].max(1e-12) * p_ahead[2] {
-                    // Only what remembers is there to be smoothed.
-                    let gain = if p_ahead[2] > 0.0 {
-                        decay * p[2] / p_ahead[2]
-                    } else {
-                        0.0
-                    };
-                    let m = [mean[0], mean[1] + gain * (m_later[1] - ahead[1])];
-                    let v = [p[0], p[1], p[2] + gain * gain * (v_later[2] - p_ahead[2])];
-                    (m, v)
-                } else {
-                    smooth_pair(
-                        (gather, decay),
-                        (mean, p),
-                        (ahead, p_ahead),
-                        (m_later, v_later),
-                    )
-                }
-            }
-        };
-        smoothed[i] = (m[1], v[2]);
-        later = Some((m, v));
-    }
-    smoothed
-}
-
-/// One step back with both states: C = P F' (P ahead)^-1.
-fn smooth_pair(
-    (gather, decay): (f64, f64),
-    (mean, p): ([f64; 2], Covariance),
-    (ahead, p_ahead): ([f64; 2], Covariance),
-    (m_later, v_later): ([f64; 2], Covariance),
-) -> ([f64; 2], Covariance) {
-    let determinant = p_ahead[0] * p_ahead[2] - p_ahead[1] * p_ahead[1];
-    let inverse = [
-        p_ahead[2] / determinant,
-        -p_ahead[1] / determinant,
-        p_ahead[0] / determinant,
-    ];
-    // P F', F = [[1, gather], [0, decay]].
-    let pf = [
-        [p[0] + gather * p[1], decay * p[1]],
-        [p[1] + gather * p[2], decay * p[2]],
-    ];
-    let row = |r: [f64; 2]| {
-        [
-            r[0] * inverse[0] + r[1] * inverse[1],
-            r[0] * inverse[1] + r[1] * inverse[2],
-        ]
-    };
-    let c = [row(pf[0]), row(pf[1])];
-    let off = [m_later[0] - ahead[0], m_later[1] - ahead[1]];
-    let fall = [
-        v_later[0] - p_ahead[0],
-        v_later[1] - p_ahead[1],
-        v_later[2] - p_ahead[2],
-    ];
-    let add = |a: [f64; 2], b: [f64; 2]| {
-        a[0] * (fall[0] * b[0] + fall[1] * b[1]) + a[1] * (fall[1] * b[0] + fall[2] * b[1])
-    };
-    (
-        [
-            mean[0] + c[0][0] * off[0] + c[0][1] * off[1],
-            mean[1] + c[1][0] * off[0] + c[1][1] * off[1],
-        ],
-        [
-            p[0] + add(c[0], c[0]),
-            p[1] + add(c[0], c[1]),
-            p[2] + add(c[1], c[1]),
-        ],
-    )
 }
 
 #[cfg(test)]

@@ -21,7 +21,9 @@ impl Search<'_> {
         round: usize,
     ) -> Option<OneMore> {
         let each = || refitted.iter().zip(judged);
-        if !base.terms.is_empty() || judged.iter().any(|(_, reason)| reason.is_none()) {
+        let mut open = each().filter(|(_, (_, reason))| reason.is_none());
+        let is_beaten = |one: &Refitted| self.is_beaten_by_its_other_form(one, refitted, judged);
+        if !base.terms.is_empty() || open.any(|(one, _)| !is_beaten(one)) {
             return None;
         }
         let refused = each().filter(|(_, (held, reason))| held.is_some() && reason.is_some());
@@ -57,6 +59,26 @@ impl Search<'_> {
             }
         }
         None
+    }
+
+    /// Whether a covariate explains clearly more in its other form, which its later block alone speaks against: a law that lacks a second effect drifts
+    /// without it, and the wrong form drifts less.
+    fn is_beaten_by_its_other_form(
+        &self,
+        one: &Refitted,
+        refitted: &[Refitted],
+        judged: &[Judgement],
+    ) -> bool {
+        let is_of_the_other = |other: &Refitted| {
+            let same = other.term.kind == one.term.kind && other.term.channel == one.term.channel;
+            same && one.term.channel.is_some() && !other.is_as(one)
+        };
+        let mut others = refitted.iter().zip(judged);
+        others.any(|(other, (held, reason))| {
+            let is_refused = held.is_some() && reason.is_some();
+            let leads = other.gain >= one.gain + self.options.bic_margin;
+            is_refused && leads && is_of_the_other(other)
+        })
     }
 
     /// Whether both together predict the block no worse, in each way that a single effect may be judged by: what is forgiven of an

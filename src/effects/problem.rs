@@ -53,6 +53,12 @@ pub(super) struct Problem {
 }
 
 impl Problem {
+    /// The fitted readings less a prediction of all readings.
+    pub(super) fn residual(&self, prediction: &[f64]) -> Vec<f64> {
+        let both = self.y.iter().zip(prediction).take(self.used);
+        both.map(|(y, prediction)| y - prediction).collect()
+    }
+
     /// From cleaned readings; `channels` say how fine the load may change. `None` with fewer than eight.
     pub(super) fn new(series: &Series, channels: &[Channel]) -> Option<Self> {
         let mut observations = Observations::of(series);

@@ -9,7 +9,6 @@ use super::problem::Problem;
 use super::term::{Scratch, Term, coefficients_of, law_parameters, read};
 use crate::fit::{Damping, Descendable, StepOutcome, descend};
 use crate::model::Driven;
-use crate::reading::Quantity;
 use nalgebra::{DMatrix, DVector};
 
 /// Most steps of Gauss and Newton for one fit.
@@ -22,6 +21,8 @@ const DAMPING: Damping = Damping {
     most_tries: 8,
     ..Damping::PLAIN
 };
+/// Where among the parameters those of the law's shape stand.
+const SHAPE: std::ops::Range<usize> = 1..4;
 /// Rounds of 'which noise, then which law': the third no longer changes the choice.
 const NOISE_ROUNDS: usize = 4;
 
@@ -58,8 +59,7 @@ impl Fitted {
 
     /// Readings less prediction, of the fitted ones.
     pub(super) fn residual(&self, problem: &Problem) -> Vec<f64> {
-        let both = problem.y.iter().zip(&self.prediction).take(problem.used);
-        both.map(|(y, prediction)| y - prediction).collect()
+        problem.residual(&self.prediction)
     }
 
     /// Root mean square of readings less prediction over a range of readings.
@@ -79,6 +79,8 @@ pub(super) struct Start {
     pub(super) noise: Noise,
     /// So many parameters at the end stay as they are.
     pub(super) frozen: usize,
+    /// Whether the law's shape (r, a and p) stays as it is.
+    pub(super) holds_shape: bool,
 }
 
 impl Start {
@@ -104,49 +106,9 @@ impl Start {
             parameters: fitted.parameters.clone(),
             noise: fitted.noise,
             frozen: 0,
+            holds_shape: false,
         }
     }
-}
-
-/// Which of [`plain_starts`] answers to a load at once.
-pub(super) const AT_ONCE: usize = 1;
-
-/// Starts of the law alone: steady, steady and answering to a load at once, accelerating, relaxing from above and from below, soon there, and there within the first readings.
-pub(super) fn plain_starts(problem: &Problem) -> Vec<Start> {
-    let shapes = [
-        (0.0, -2.0, 0.0),
-        (0.0, -6.0, 0.0),
-        (0.8, -1.0, 0.3),
-        (0.95, -3.0, 0.0),
-        (-3.0, 1.0, -0.5),
-        (1.0, 2.0, -0.5),
-        (-20.0, 3.4, -0.8),
-        (-150.0, 5.2, -1.0),
-    ];
-    let used = problem.used;
-    let ends = (used / 5).max(2);
-    let early = match problem.quantity {
-        Quantity::Displacement => {
-            (problem.y[ends] - problem.y[0]) / (problem.t[ends] - problem.t[0])
-        }
-        Quantity::Velocity => problem.y[..ends].iter().sum::<f64>() / ends as f64,
-    };
-    let typical = problem.typical_velocity();
-    let early = early.clamp(0.01 * typical, 100.0 * typical);
-    let start = |(r, ln_a, p): (f64, f64, f64)| {
-        let velocity = if r == 0.0 { typical } else { early };
-        let mut parameters = vec![velocity.ln(), r, ln_a, p];
-        if problem.quantity == Quantity::Displacement {
-            parameters.push(problem.y[0]);
-        }
-        Start {
-            terms: Vec::new(),
-            parameters,
-            noise: Noise::WHITE,
-            frozen: 0,
-        }
-    };
-    shapes.into_iter().map(start).collect()
 }
 
 /// The best of several starts under the noise models of `noises`; `None` where none leads to a motion.
@@ -291,8 +253,7 @@ impl ParameterPoint {
     }
 
     fn residual(&self, problem: &Problem) -> Vec<f64> {
-        let both = problem.y.iter().zip(&self.prediction).take(problem.used);
-        both.map(|(y, prediction)| y - prediction).collect()
+        problem.residual(&self.prediction)
     }
 
     fn fitted(&self, problem: &Problem, terms: &[Term], whitener: &Whitener) -> Fitted {
@@ -440,20 +401,24 @@ impl Refitting<'_> {
 
 impl Descendable for Refitting<'_> {
     fn linearise(&mut self) -> bool {
-        let (problem, frozen) = (self.problem, self.start.frozen);
+        let (problem, start) = (self.problem, self.start);
+        let (frozen, holds_shape) = (start.frozen, start.holds_shape);
         let columns = (self.point).jacobian(problem, &self.start.terms, self.scratch);
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let mut white = self.whitener.whiten_all(&columns);
-        for column in white.iter_mut().rev().take(frozen) {
-            column.fill(0.0);
+        let count = white.len();
+        let is_held = |k: &usize| *k >= count - frozen || holds_shape && SHAPE.contains(k);
+        let held: Vec<usize> = (0..count).filter(is_held).collect();
+        for k in &held {
+            white[*k].fill(0.0);
         }
         let misfit = dot(&self.innovations, &self.innovations);
         let parameters = &self.point.parameters;
         self.variance = (misfit / problem.used as f64).max(1e-300);
         self.objective = misfit / self.variance + self.prior.misfit(parameters);
         let (normal, mut slope) = self.normal_equations(&white);
-        for k in parameters.len() - frozen..parameters.len() {
-            slope[k] = 0.0;
+        for k in &held {
+            slope[*k] = 0.0;
         }
         self.normal = (normal, slope);
         true

@@ -1,9 +1,8 @@
 //! What a covariate does to the slope after a while: its exponential or gamma response, by level or by rate.
 
-use super::act::standardise;
-use super::definition::YEAR;
+use super::act::{mean_and_deviation, standardise};
 use super::kind::Form;
-use crate::reading::{Channel, CovariateKind, RunningTotal, Timestamp, days_since};
+use crate::reading::{Channel, CovariateKind, DAYS_PER_YEAR, RunningTotal, Timestamp, days_since};
 
 /// A covariate's values on an even grid of days, standardised by nothing: in its own unit.
 #[derive(Debug, Clone)]
@@ -40,6 +39,8 @@ const SPELLS: f64 = 0.02;
 const ZEROS: f64 = 0.02;
 const DRY: f64 = 1.5;
 
+/// Of what had gathered before a covariate's first value less than this share is nothing.
+const REMEMBERED: f64 = 0.02;
 /// This share of a step is rounding.
 const ROUNDING: f64 = 1e-6;
 /// A mean delay of less than this share of the step between values is none.
@@ -53,6 +54,8 @@ pub(super) struct Response {
     pub(super) stages: u8,
     /// Mean delay, days.
     pub(super) mean_days: f64,
+    /// By so much, in the covariate's unit, what had gathered before its first value differs from what is usual; 0 where that is not fitted.
+    pub(super) before: f64,
 }
 
 impl Response {
@@ -162,6 +165,17 @@ impl Driver {
         self.values.len()
     }
 
+    /// Whether what had gathered before its first value still counts on that day.
+    pub(super) fn remembers_its_start(&self, response: Response, day: f64) -> bool {
+        response.mean_days >= SHORTEST * self.step
+            && (-(day - self.start).max(0.0) / response.mean_days).exp() > REMEMBERED
+    }
+
+    /// The standard deviation of its values.
+    pub(super) fn spread(&self) -> f64 {
+        mean_and_deviation(&self.values).1
+    }
+
     /// Days from one value to the next.
     pub(super) fn step(&self) -> f64 {
         self.step
@@ -231,7 +245,7 @@ impl Driver {
             }
             let mean = response.mean_days / f64::from(response.stages);
             if mean >= SHORTEST * self.step {
-                let from = settled.unwrap_or_else(|| self.settled(mean));
+                let from = settled.unwrap_or_else(|| self.settled(mean) + response.before);
                 filter(&mut level, self.step, (mean, from), is_total);
                 is_total = false;
                 settled = Some(level[0]);
@@ -254,7 +268,7 @@ impl Driver {
                     clippy::cast_sign_loss,
                     reason = "a number of steps"
                 )]
-                let place = |year: f64| (year * YEAR / self.step).round() as usize;
+                let place = |year: f64| (year * DAYS_PER_YEAR / self.step).round() as usize;
                 let places = (1..).map(f64::from).map(place);
                 let places: Vec<usize> = places
                     .take_while(|place| *place < self.values.len())
@@ -279,7 +293,7 @@ impl Driver {
     fn rate(&self, filtered: &[f64], response: Response) -> Vec<f64> {
         let changes = filtered.windows(2).map(|w| (w[1] - w[0]) / self.step);
         let mut slopes: Vec<f64> = changes.collect();
-        let before = if response.mean_days < 0.5 * self.step {
+        let before = if response.mean_days < 0.5 * self.step || response.before != 0.0 {
             slopes.first().copied().unwrap_or(0.0)
         } else {
             0.0

@@ -4,7 +4,7 @@ use super::act::{Act, amplitudes};
 use super::candidates;
 use super::definition::Support;
 use super::explanation::Candidate;
-use super::fresh::best_of_starts;
+use super::fresh::{best_of_starts, plain_starts};
 use super::inverted::inverted_starts;
 use super::judge::{
     Compared, HeldOut, StepErrors, block, held_out, most_extrapolated, newest_coefficients,
@@ -15,7 +15,7 @@ use super::noise::{Noise, Whitener};
 use super::objection::{Judgement, Objection, ObjectionWeight};
 use super::options::Options;
 use super::problem::Problem;
-use super::refit::{Fitted, Start, plain_starts, refit_every_memory};
+use super::refit::{Fitted, Start, refit_every_memory};
 use super::response::Driver;
 use super::rival::Rival;
 use super::surrogate::NullGains;
@@ -265,6 +265,7 @@ impl Search<'_> {
             full = next;
             accepted.extend(how);
             self.drop_needless(&mut full, &mut accepted);
+            self.settle_delays(&mut full);
         }
         Some(SearchResult {
             plain,

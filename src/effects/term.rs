@@ -34,9 +34,10 @@ impl Term {
 
     /// What it costs in the BIC: coefficients, and the shape that was searched for.
     pub(super) fn parameters(&self) -> f64 {
-        let shape =
-            f64::from(u8::from(self.at.is_some())) + f64::from(u8::from(self.response.is_some()));
-        self.coefficients() as f64 + shape
+        let has_start = self.response.is_some_and(|own| own.before != 0.0);
+        let shape = [self.at.is_some(), self.response.is_some(), has_start];
+        let shape = shape.into_iter().filter(|has| *has).count();
+        (self.coefficients() + shape) as f64
     }
 }
 

@@ -435,6 +435,7 @@ mod tests {
             terms: Vec::new(),
             noise: super::super::noise::Noise::WHITE,
             frozen: 0,
+            holds_shape: false,
         };
         let start = start.with_size(&term, -by);
         let white = Whitener::new(&problem, start.noise);

@@ -3,6 +3,7 @@
 use super::{Picture, day};
 use crate::effects::{Effect, Explanation, Structure};
 use crate::plot::{Axis, BLACK, BLUE, Figure, GREEN, GREY, Legend, Mark, PURPLE, Panel, RED};
+use crate::reading::HALF_WIDTH_90;
 
 /// Size of a panel, in the sheet's units.
 const PANEL: (f64, f64) = (920.0, 230.0);
@@ -10,8 +11,6 @@ const PANEL: (f64, f64) = (920.0, 230.0);
 const TALL: (f64, f64) = (920.0, 360.0);
 const DASHED: &str = "6 4";
 const DOTTED: &str = "2 3";
-/// Half the width of a band that holds 90 %, in standard deviations.
-const HALF_OF_90: f64 = 1.645;
 /// More points than this no sheet can show.
 const MOST_POINTS: usize = 1600;
 
@@ -127,7 +126,7 @@ pub(super) fn undeclared_load(explanation: &Explanation) -> Option<Picture> {
         ("before", &curves.load_before, RED),
         ("after", &curves.load_after, BLUE),
     ];
-    let edges = |&(mean, sd): &(f64, f64)| [mean - HALF_OF_90 * sd, mean + HALF_OF_90 * sd];
+    let edges = |&(mean, sd): &(f64, f64)| [mean - HALF_WIDTH_90 * sd, mean + HALF_WIDTH_90 * sd];
     let all = both.iter().flat_map(|one| one.1.iter().flat_map(edges));
     let y = Axis::around("e-folds of velocity", all);
     let mut panels = Vec::new();

@@ -3,14 +3,12 @@
 use super::{Picture, title};
 use crate::effects::Explanation;
 use crate::plot::{Axis, BLUE, Bar, Bars, Figure, GREEN, GREY, Legend, Mark, Panel, RED};
+use crate::reading::HALF_WIDTH_95;
 
 /// Size of a panel, in the sheet's units.
 const PANEL: (f64, f64) = (460.0, 240.0);
 /// Width of the sheet.
 const WIDTH: f64 = 920.0;
-/// Half the width of the band that holds 95 % of the autocorrelations of noise, times the root of
-/// their number.
-const HALF_OF_95: f64 = 1.96;
 /// No figure shows more rivals.
 const MOST_RIVALS: usize = 16;
 /// Lags under half a day are reported in hours.
@@ -20,7 +18,7 @@ const HALF_A_DAY: f64 = 0.5;
 pub(super) fn autocorrelation(explanation: &Explanation) -> Option<Picture> {
     let curves = &explanation.curves;
     let count = curves.times.len() as f64;
-    let band = HALF_OF_95 / count.sqrt();
+    let band = HALF_WIDTH_95 / count.sqrt();
     if !band.is_finite() || curves.autocorrelation.before.len() < 2 {
         return None;
     }

@@ -11,6 +11,7 @@
 use super::Scales;
 use super::scales::{Scale, VelocityChange};
 use crate::fit::Observations;
+use crate::reading::DAYS_PER_YEAR;
 
 /// Prior rate of accelerations, a year, at one scale.
 const RATE_OF_A_SCALE: f64 = 0.3;
@@ -84,7 +85,7 @@ fn summed(scales: &Scales) -> Vec<(f64, f64)> {
 fn odds(scales: &Scales, scale: &Scale) -> f64 {
     let most = most_freedom(scales.length_days, scale.days);
     let factor = |change: &VelocityChange| ln_bayes_factor(change, most).min(SURE).exp();
-    let prior = RATE_OF_A_SCALE / 365.25 * scale.days;
+    let prior = RATE_OF_A_SCALE / DAYS_PER_YEAR * scale.days;
     prior * f64::midpoint(factor(&scale.near), factor(&scale.far))
 }
 

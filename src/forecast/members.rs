@@ -2,6 +2,7 @@
 //! velocity.
 
 use super::free_exponent::FreeExponent;
+use super::law_passages::passages;
 use super::{InverseVelocityLine, Passage};
 use crate::fit::{LoadPosterior, Observations, Rate, RateOptions};
 
@@ -49,7 +50,7 @@ impl Members {
 
     /// The same from the rates and the posterior of the law.
     pub(super) fn by(rates: &[Rate], posterior: Option<&LoadPosterior>, now_days: f64) -> Self {
-        let law = super::panel::passages(rates, posterior, PASSED, now_days);
+        let law = passages(rates, posterior, PASSED, now_days);
         let line = |count: usize| {
             let newest = &rates[rates.len().saturating_sub(count)..];
             InverseVelocityLine::approach(newest, now_days).unwrap_or(0.0)

@@ -3,6 +3,7 @@
 
 use super::excursions::without_excursions;
 use super::isolated_step::without_isolated_steps;
+use super::law_passages::passages;
 use super::surprise::Surprise;
 use super::{Indicators, Members, Passage};
 use crate::fit::{Ensemble, LoadPosterior, Observation, Observations, Rate, RateOptions};
@@ -15,14 +16,8 @@ use std::collections::BTreeMap;
 
 /// Fewest readings before anything is forecast: below it the priors would decide, not the slope.
 pub const FEWEST_READINGS: usize = 10;
-/// A slope at 50 m/day has failed by any account, mm/day.
-const FASTEST_CRITICAL: f64 = 5e4;
-/// The law's passages are followed so far, days.
-const FARTHEST_DAYS: f64 = 10.0 * HORIZON_DAYS;
 /// A reading is predicted within so many standard deviations of where the law puts it.
 const WITHIN: f64 = 4.0;
-/// How far the forecast looks, days.
-pub const HORIZON_DAYS: f64 = 400.0;
 
 /// What the panel says after its newest reading.
 #[derive(Debug, Clone, PartialEq)]
@@ -218,26 +213,6 @@ pub fn by_the_law(observations: &Observations, critical: f64) -> Option<Passage>
     Some(Passage::from_times(law))
 }
 
-/// (days from `now_days`, probability) of passing `critical` mm/day by the law; none where the slope does not
-/// measurably move.
-pub(super) fn passages(
-    rates: &[Rate],
-    posterior: Option<&LoadPosterior>,
-    critical: f64,
-    now_days: f64,
-) -> Vec<(f64, f64)> {
-    let Some(posterior) = posterior.filter(|_| measurably_moves(rates)) else {
-        return Vec::new();
-    };
-    let later = now_days - posterior.now_days;
-    let critical = critical.min(FASTEST_CRITICAL);
-    let mut law = posterior.passages(critical, FARTHEST_DAYS + later);
-    for (days, _) in &mut law {
-        *days = (*days - later).max(0.0);
-    }
-    law
-}
-
 impl Outlook {
     /// This forecast, which knows a load that was found, with `plain` beside it, which knows none. What was found may be wrong, and
     /// then it is wrong with confidence: a quarter of the weight stays with the law that went without. Where the motion is not
@@ -310,15 +285,6 @@ fn unknown() -> BTreeMap<Regime, f64> {
         .into_iter()
         .map(|regime| (regime, 0.0))
         .collect()
-}
-
-/// Whether any of the newest rates stands clear of its noise: where none does, a forecast would be the
-/// prior's and not the slope's.
-pub(crate) fn measurably_moves(rates: &[Rate]) -> bool {
-    let newest = &rates[rates.len().saturating_sub(6)..];
-    newest
-        .iter()
-        .any(|rate| rate.velocity > 3.0 * rate.sigma && rate.velocity > 0.0)
 }
 
 /// The newest reading as the velocity that what was expected is scored on.

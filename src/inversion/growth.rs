@@ -5,6 +5,7 @@
 
 use super::estimate::Estimate;
 use crate::fit::Rate;
+use crate::reading::CHI_SQUARED_90;
 
 /// The exponents looked at: lowest, step, how many.
 const ALPHAS: (f64, f64, u32) = (0.0, 0.01, 501);
@@ -13,7 +14,7 @@ const POLES: (f64, f64, u32) = (1e-4, 1e3, 500);
 /// Fewest rates for three unknowns and a scatter.
 const FEWEST: usize = 6;
 /// 90 % quantile of chi squared with one degree of freedom.
-const DROP: f64 = 2.706;
+const DROP: f64 = CHI_SQUARED_90;
 /// ln v is never known better than this.
 const LEAST_SCATTER: f64 = 1e-4;
 

@@ -2,6 +2,7 @@
 
 use super::report::FittedRegime;
 use crate::fit::{LawDraws, Rate};
+use crate::reading::HALF_WIDTH_90;
 
 /// Said where the parameters have no intervals although there are readings enough.
 const UNSETTLED: &str = "The parameters have no intervals: the laws that were drawn from what the readings leave open did not spread over it, \
@@ -18,7 +19,7 @@ const NEWEST: f64 = 1.0 / 3.0;
 const FEWEST: usize = 6;
 /// A velocity stands still where its change over that, ln, is less than this with 95 % certainty.
 const STILL: f64 = 0.1;
-const CERTAIN: f64 = 1.645;
+const CERTAIN: f64 = HALF_WIDTH_90;
 
 /// Whether the velocity has stood still over the last third of the record: by a straight line through ln v.
 pub(super) fn has_stood_still(rates: &[Rate]) -> bool {

@@ -34,7 +34,7 @@ pub struct FitReport {
     /// Which regime, with what probability, under a load that never changed; where m is given, of the laws with about this m, and null with too
     /// few of them.
     pub regime: FittedRegime,
-    /// The same where the load may change undeclared: what the monitor goes by. `None` with too few readings, and where m is given.
+    /// The same where the load may change undeclared: what the monitor uses. `None` with too few readings, and where m is given.
     pub regime_under_load: Option<FittedRegime>,
     /// The law's parameters; without intervals where the laws drawn do not suffice for any, which `remarks` says.
     pub parameters: Parameters,

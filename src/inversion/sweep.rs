@@ -56,7 +56,7 @@ pub struct SweepRow {
     pub readings: usize,
     /// Which regime, with what probability, the load being constant.
     pub regime: FittedRegime,
-    /// The same where the load may change undeclared: what the monitor goes by. `None` with too few readings, and where m is given.
+    /// The same where the load may change undeclared: what the monitor uses. `None` with too few readings, and where m is given.
     pub regime_under_load: Option<FittedRegime>,
     /// Whether the velocity stood still over the last third of the readings; for the text.
     #[serde(skip)]

@@ -6,6 +6,7 @@ use crate::alert::Level;
 use crate::effects::{Explained, Form, Kind, Rival};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::regime::Regime;
+use jiff::SignedDuration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -51,9 +52,9 @@ pub enum EventKind {
         transition_time: Option<Timestamp>,
         /// The velocity now, mm/day.
         velocity_mm_per_day: Option<f64>,
-        /// Chance of collapse within the evacuation time, as levels go by it.
+        /// Chance of collapse within the evacuation time, as levels use it.
         chance_within_evacuation_time: f64,
-        /// Chance of collapse within the outlook, as levels go by it.
+        /// Chance of collapse within the outlook, as levels use it.
         chance_within_outlook: f64,
         /// The level that this forecast calls for, and the chances that the levels are called by. Absent in states of older
         /// versions.
@@ -264,6 +265,14 @@ pub struct LevelChance {
     pub within_hours: f64,
     /// From which chance on the level is called.
     pub at_least: f64,
+}
+
+impl LevelChance {
+    /// The time that it is for.
+    pub fn within(&self) -> SignedDuration {
+        let seconds = (3600.0 * self.within_hours).round();
+        SignedDuration::try_from_secs_f64(seconds).unwrap_or(SignedDuration::MAX)
+    }
 }
 
 /// The forecast of the law under a constant load, beside that of the law under the known load.

@@ -184,7 +184,7 @@ impl EventKind {
         self.shown().name
     }
 
-    /// Whether it says what has changed over the whole record, which only who has gone through it knows.
+    /// Whether it says what has changed over the whole record, which only who has judged it knows.
     pub(super) fn is_of_the_record(&self) -> bool {
         self.shown().about == About::Record
     }
@@ -367,7 +367,7 @@ fn effect_found(kind: &EventKind) -> String {
         )
     };
     let use_of = if *adopted {
-        "forecasts go by it"
+        "forecasts use it"
     } else {
         "forecasts go without it"
     };

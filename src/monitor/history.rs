@@ -4,7 +4,7 @@ use super::declared::Declarations;
 use super::motion::settled;
 use crate::fit::{Observation, Observations, Rate, RateOptions};
 use crate::reading::{
-    BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
+    BenchmarkId, Quantity, Reading, Series, Timestamp, Unit, days_of, days_since,
     instant_after_days,
 };
 use jiff::SignedDuration;
@@ -68,9 +68,7 @@ struct Reset {
 
 impl History {
     pub(super) fn new(source: MeasuredAs, epoch: Timestamp) -> Self {
-        let averaging_days = source
-            .averaging
-            .map_or(0.0, |span| span.as_secs_f64() / SECONDS_PER_DAY);
+        let averaging_days = source.averaging.map_or(0.0, days_of);
         let observations = Observations {
             quantity: source.unit.quantity(),
             averaging_days,
@@ -321,23 +319,26 @@ impl History {
 
     /// The newest `most` readings as they were read, in `unit`, but for what is declared to be no motion.
     pub(super) fn as_read(&self, unit: Unit, most: usize) -> Vec<(Timestamp, f64)> {
+        self.newest_in(unit, most, |one| one.value)
+    }
+
+    fn newest_in(
+        &self,
+        unit: Unit,
+        most: usize,
+        value: impl Fn(&Observation) -> f64,
+    ) -> Vec<(Timestamp, f64)> {
         let values = &self.observations.values;
         let newest = &values[values.len().saturating_sub(most)..];
         let read = newest
             .iter()
-            .filter_map(|one| Some((self.time(one.t_days)?, one.value / unit.factor())));
+            .filter_map(|one| Some((self.time(one.t_days)?, value(one) / unit.factor())));
         read.collect()
     }
 
     /// The same readings with what resets have taken off.
     pub(super) fn with_resets(&self, unit: Unit, most: usize) -> Vec<(Timestamp, f64)> {
-        let values = &self.observations.values;
-        let newest = &values[values.len().saturating_sub(most)..];
-        let read = newest.iter().filter_map(|one| {
-            let value = one.value + self.taken_off(one.t_days);
-            Some((self.time(one.t_days)?, value / unit.factor()))
-        });
-        read.collect()
+        self.newest_in(unit, most, |one| one.value + self.taken_off(one.t_days))
     }
 
     /// Whether a reset after `time` has been taken off.

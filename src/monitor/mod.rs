@@ -51,12 +51,14 @@ pub(crate) use motion::recent;
 pub use notice::{CLOCK_FAULT, Notice};
 pub use order::Order;
 pub use parallel::{Task, Workers};
+pub(crate) use saved::from_bytes;
 pub use saved::{MemoryPart, SavedError};
 pub use search::{SearchFinding, SearchJob};
 pub use silence::MAY_SKIP;
 pub use site::{SiteLevel, site_text};
 pub use undeclared::UndeclaredLoad;
 pub use watched::Watched;
+pub(crate) use watched::{WRITTEN, means_the_same};
 
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, CovariateKind, Reading, Sample, Suspicion, Timestamp, Unit};

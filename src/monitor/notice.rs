@@ -23,7 +23,7 @@ pub enum Notice {
     PastOf(BenchmarkId),
     /// The past has been read: the newest readings of the next benchmarks are judged.
     Current,
-    /// The past of a benchmark is gone through a little further.
+    /// The past of a benchmark is judged a little further.
     Retrace,
     /// What came late or was corrected is judged only at [`Notice::BatchEnd`], and not reading by reading.
     #[serde(rename = "settles")]

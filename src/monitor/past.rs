@@ -25,9 +25,9 @@ pub(super) struct Past {
     of: BTreeSet<BenchmarkId>,
     /// Benchmarks whose newest reading is still to be judged.
     current: BTreeSet<BenchmarkId>,
-    /// Those whose past is still to be gone through, and the reading that was judged first.
+    /// Those whose past is still to be judged, and the reading that was judged first.
     owed: BTreeMap<BenchmarkId, Timestamp>,
-    /// The one whose past is being gone through; a part of the memory by itself.
+    /// The one whose past is being judged; a part of the memory by itself.
     #[serde(skip)]
     walk: Option<PastReplay>,
 }
@@ -59,12 +59,12 @@ impl Past {
         self.walk.take_if(|walk| walk.benchmark() == benchmark);
     }
 
-    /// The past that is being gone through.
+    /// The past that is being judged.
     pub(super) fn walk(&self) -> Option<&PastReplay> {
         self.walk.as_ref()
     }
 
-    /// The same, with this past being gone through.
+    /// The same, with this past being judged.
     pub(super) fn with_walk(self, walk: Option<PastReplay>) -> Self {
         Self { walk, ..self }
     }

@@ -15,12 +15,13 @@ use super::together::FailureComparisons;
 use super::track::{PastReplay, Track};
 use super::{Monitor, Settings};
 use crate::reading::BenchmarkId;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The part that belongs to no benchmark.
 const REST: &str = "";
-/// The part of the benchmark whose past is being gone through.
+/// The part of the benchmark whose past is being judged.
 const WALK: &str = "\0past";
 
 /// One piece of a monitor's memory.
@@ -49,7 +50,7 @@ pub enum SavedError {
         /// Which.
         name: String,
         /// Why.
-        source: rmp_serde::decode::Error,
+        source: erased_serde::Error,
     },
     /// The part that belongs to no benchmark is not there.
     #[error("the monitor's memory has no part for the site")]
@@ -185,11 +186,22 @@ fn bytes(name: &str, value: &impl Serialize) -> Result<Vec<u8>, SavedError> {
     })
 }
 
-fn value<T: for<'de> Deserialize<'de>>(name: &str, body: &[u8]) -> Result<T, SavedError> {
-    rmp_serde::from_slice(body).map_err(|source| SavedError::Unreadable {
+fn value<T: DeserializeOwned>(name: &str, body: &[u8]) -> Result<T, SavedError> {
+    from_bytes(body).map_err(|source| SavedError::Unreadable {
         name: name.to_owned(),
         source,
     })
+}
+
+/// The value that `rmp_serde::to_vec_named` wrote. All types share one decoder: compiled for each of them it is a tenth of the program.
+///
+/// # Errors
+/// What in the bytes is not of the type.
+pub(crate) fn from_bytes<T: DeserializeOwned>(body: &[u8]) -> Result<T, erased_serde::Error> {
+    let mut decoder = rmp_serde::Deserializer::from_read_ref(body);
+    erased_serde::deserialize(&mut <dyn erased_serde::Deserializer<'_>>::erase(
+        &mut decoder,
+    ))
 }
 
 #[cfg(test)]
@@ -280,7 +292,7 @@ mod tests {
     }
 
     fn map(part: &MemoryPart) -> Value {
-        rmp_serde::from_slice(part.body.as_ref().unwrap()).unwrap()
+        from_bytes(part.body.as_ref().unwrap()).unwrap()
     }
 
     /// Whether all that `old` has stands in `new`, which may have more.

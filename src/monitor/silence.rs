@@ -1,6 +1,6 @@
 //! How long a benchmark may be silent: silence is not safety.
 
-use crate::reading::Timestamp;
+use crate::reading::{SECONDS_PER_DAY, Timestamp, upper_median_by};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -182,9 +182,8 @@ impl Silence {
 
     /// The usual spacing as far as it is known: from two readings on.
     pub(super) fn median(&self) -> Option<SignedDuration> {
-        let mut sorted: Vec<SignedDuration> = self.spacings.iter().copied().collect();
-        sorted.sort_unstable();
-        sorted.get(sorted.len() / 2).copied()
+        let mut spacings: Vec<SignedDuration> = self.spacings.iter().copied().collect();
+        upper_median_by(&mut spacings, Ord::cmp)
     }
 
     /// The longest of the spacings was none.
@@ -281,7 +280,7 @@ impl Silence {
         if of < FEWEST_LEARNT || share <= 0.0 || share >= 1.0 {
             return MAY_SKIP;
         }
-        let a_day = 86_400.0 / usual.as_secs_f64().max(1.0);
+        let a_day = SECONDS_PER_DAY / usual.as_secs_f64().max(1.0);
         let skipped = (BY_CHANCE_A_DAY / a_day).ln() / share.ln();
         (MAY_SKIP..MOST_SKIPPED)
             .find(|skip| f64::from(*skip) >= skipped)

@@ -113,8 +113,7 @@ impl History {
             return true;
         }
         let values = &self.observations.values;
-        let (earlier, _) = values.split_at(values.len() - latest.len());
-        let earlier = steps(&earlier[earlier.len().saturating_sub(USUAL)..]);
+        let earlier = self.steps_before(latest);
         let lies_under = |(share, factor): (f64, f64)| {
             let under = earlier.iter().filter(|step| is_less(factor * **step));
             index_of(share, earlier.len()).is_some_and(|at| under.count() > at)
@@ -126,11 +125,16 @@ impl History {
         has_tiny_steps(&all, &inspected)
     }
 
-    /// From what size on a step between two of the `latest` readings is a jump.
-    fn jump_size(&self, latest: &[Observation]) -> f64 {
+    /// Of the readings before the `latest`, the newest of them.
+    fn steps_before(&self, latest: &[Observation]) -> Vec<f64> {
         let values = &self.observations.values;
         let (earlier, _) = values.split_at(values.len() - latest.len());
-        let earlier = steps(&earlier[earlier.len().saturating_sub(USUAL)..]);
+        steps(&earlier[earlier.len().saturating_sub(USUAL)..])
+    }
+
+    /// From what size on a step between two of the `latest` readings is a jump.
+    fn jump_size(&self, latest: &[Observation]) -> f64 {
+        let earlier = self.steps_before(latest);
         let step = resolution(latest);
         let usual = if earlier.len() >= FEWEST_BEFORE {
             times(&earlier, HALF).max(times(&earlier, NEARLY_ALL))
@@ -138,7 +142,7 @@ impl History {
             f64::INFINITY
         };
         let usual = usual.min(times(&steps(latest), QUARTER));
-        let all = steps(&values[values.len().saturating_sub(USUAL)..]);
+        let all = self.steps_before(&[]);
         let usual = usual.min(spoilt_from_the_beginning(&all, step));
         let least = match self.observations.quantity {
             Quantity::Displacement => 0.0,

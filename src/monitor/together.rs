@@ -12,7 +12,7 @@ use super::track::Track;
 use crate::alert::{Level, Policy};
 use crate::fit::Rate;
 use crate::forecast::{Dependence, Group, HORIZON_DAYS, Snapshot, groups};
-use crate::reading::{BenchmarkId, SECONDS_PER_DAY, Timestamp, after_days, days_since};
+use crate::reading::{BenchmarkId, Timestamp, after_days, days_of, days_since};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -47,7 +47,7 @@ impl FailureComparisons {
         in_force: &LevelsInForce,
         has_changed: bool,
     ) -> Option<Event> {
-        let evacuation_days = policy.evacuation_time.as_secs_f64() / SECONDS_PER_DAY;
+        let evacuation_days = days_of(policy.evacuation_time);
         let newest = self.kept.last().map(|(time, _)| days_since(*time, now));
         if !has_changed && newest.is_some_and(|ago| ago < APART * evacuation_days) {
             return None;

@@ -8,6 +8,15 @@ use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Stands before how the files of a source are written, in what decides which numbers its readings are.
+pub(crate) const WRITTEN: &str = "; written ";
+
+/// Whether readings mean the same now as `before`. Earlier versions did not keep how the files are written.
+pub(crate) fn means_the_same(before: &str, now: &str) -> bool {
+    let of_earlier_versions = now.split(WRITTEN).next();
+    before == now || !before.contains(WRITTEN) && Some(before) == of_earlier_versions
+}
+
 /// The benchmarks that are watched.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Watched {
@@ -59,7 +68,10 @@ impl Watched {
     fn goes_on_unnamed(&self, benchmark: &BenchmarkId, former: &Self) -> bool {
         let source = former.sources.get(benchmark);
         let read_as = source.and_then(|source| self.open.get(source));
-        read_as.is_some() && read_as == former.read_as.get(benchmark)
+        let before = former.read_as.get(benchmark);
+        read_as
+            .zip(before)
+            .is_some_and(|(now, before)| means_the_same(before, now))
     }
 
     /// What the readings of `benchmark` are read as, where that is something else than under `former`.
@@ -73,7 +85,7 @@ impl Watched {
             (Some(source), Some(former)) if source != former => {
                 Some(format!("source {source:?} {now}").trim_end().to_owned())
             }
-            _ => (now != before).then(|| now.clone()),
+            _ => (!means_the_same(before, now)).then(|| now.clone()),
         }
     }
 
@@ -115,10 +127,9 @@ impl Monitor {
         let changed: Vec<(BenchmarkId, String)> = (self.benchmarks.all().keys())
             .filter_map(|id| {
                 let read_as = watched.changed(id, former)?;
-                let read_as = if read_as.is_empty() {
-                    "the files themselves say"
-                } else {
-                    &read_as
+                let read_as = match read_as.trim_start_matches("; ") {
+                    "" | "written as usual" => "the files themselves say",
+                    read_as => read_as,
                 };
                 let why = format!(
                     "benchmark {id} is read as {read_as} from here on: its readings are read again; a level in force stays until \

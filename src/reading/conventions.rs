@@ -29,7 +29,7 @@ const LOGGER_CODES: [f64; 2] = [-7999.0, -99_999.0];
 /// A zone's summer time and its standard time follow each other within this.
 const A_YEAR: SignedDuration = SignedDuration::from_hours(400 * 24);
 
-/// A clock on a wall, or in a logger.
+/// A clock on a host_time, or in a logger.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LocalClock {
     /// Where it hangs; without one, a time must state its offset.
@@ -226,6 +226,14 @@ impl MissingValues {
             Ok(number) => self.numbers.push(number),
             Err(_) => self.words.push(mark.trim().to_owned()),
         }
+    }
+
+    /// The marks, but for those that a data logger's files have in any case; empty where there are none.
+    pub fn in_words(&self) -> String {
+        let stated = |number: &&f64| !LOGGER_CODES.contains(number);
+        let numbers = self.numbers.iter().filter(stated).map(f64::to_string);
+        let all: Vec<String> = numbers.chain(self.words.iter().cloned()).collect();
+        all.join(" ")
     }
 
     /// Whether a cell holds such a mark; NAN and INF always are.

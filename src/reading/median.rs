@@ -1,15 +1,22 @@
 //! The middle of values.
 
-/// The median size of a normal variable, over its standard deviation.
-pub const NORMAL_MEDIAN: f64 = 0.6745;
+use std::cmp::Ordering;
 
 /// The middle of `values`, of an even number the upper one of both; `None` of none. Their order changes.
 pub fn upper_median(values: &mut [f64]) -> Option<f64> {
+    upper_median_by(values, f64::total_cmp)
+}
+
+/// The same of values in the order of `compare`.
+pub fn upper_median_by<T: Copy>(
+    values: &mut [T],
+    compare: impl FnMut(&T, &T) -> Ordering,
+) -> Option<T> {
     let middle = values.len() / 2;
     if values.is_empty() {
         return None;
     }
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+    Some(*values.select_nth_unstable_by(middle, compare).1)
 }
 
 #[cfg(test)]

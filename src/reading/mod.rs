@@ -8,6 +8,7 @@ mod covariate;
 mod dialect;
 mod figure;
 mod median;
+mod normal;
 pub mod other_unit;
 mod plain;
 mod recording;
@@ -21,7 +22,8 @@ pub use covariate::CovariateKind;
 pub use dialect::{DecimalMark, Delimiter, Dialect, MOST_SKIPPED, ThousandsMark, TimeFormat};
 pub use figure::{counted, figure, shortest, whole_figure};
 pub use jiff::Timestamp;
-pub use median::{NORMAL_MEDIAN, upper_median};
+pub use median::{upper_median, upper_median_by};
+pub use normal::{CHI_SQUARED_90, HALF_WIDTH_90, HALF_WIDTH_95, NORMAL_MEDIAN};
 pub use plain::plain;
 pub use recording::{MergeError, Recording, SelectError};
 pub use running_total::RunningTotal;
@@ -29,12 +31,15 @@ pub use series::{Channel, Disorder, Reading, Sample, Series};
 pub use suspicion::Suspicion;
 pub use unit::{LengthUnit, Quantity, TimeUnit, Unit, UnitError, bracketed, in_brackets};
 
+use jiff::SignedDuration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Seconds in a day, the unit of time inside the science.
 pub const SECONDS_PER_DAY: f64 = 86_400.0;
+/// Days in a year.
+pub const DAYS_PER_YEAR: f64 = 365.25;
 
 /// Before all readings: the data time of what is said before there is one.
 pub const BEFORE_ALL: Timestamp = Timestamp::constant(-9_223_372_036, 0);
@@ -70,6 +75,16 @@ impl fmt::Display for BenchmarkId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(&self.0)
     }
+}
+
+/// A span in days.
+pub fn days_of(span: SignedDuration) -> f64 {
+    span.as_secs_f64() / SECONDS_PER_DAY
+}
+
+/// Seconds since 1970, to the millisecond.
+pub fn unix_seconds(time: Timestamp) -> f64 {
+    time.as_millisecond() as f64 / 1e3
 }
 
 /// Days from `epoch` to `time`, negative before it.

@@ -144,7 +144,7 @@ impl TimeUnit {
             Self::Minute => 1.0 / 1440.0,
             Self::Hour => 1.0 / 24.0,
             Self::Day => 1.0,
-            Self::Year => 365.25,
+            Self::Year => super::DAYS_PER_YEAR,
         }
     }
 }

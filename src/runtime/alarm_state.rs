@@ -183,7 +183,7 @@ impl Alarms {
         }
     }
 
-    /// The alerts that have ended, are the newest of their place, and were acknowledged by nobody.
+    /// The alerts that have ended, are the newest of their place, and were not acknowledged.
     pub fn returned(&self) -> Vec<&Event> {
         let ended = self
             .newest

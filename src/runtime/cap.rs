@@ -8,7 +8,7 @@
 use super::clock;
 use super::hook::{Alert, HookOutcome, MessageState, state_name};
 use super::way_out::{DeliveryAttempt, WayOut, destination};
-use crate::alert::Level;
+use crate::alert::{Level, is_observed};
 use crate::config::CapFolder;
 use crate::monitor::EventKind;
 use crate::reading::Timestamp;
@@ -387,7 +387,7 @@ fn parameters(out: &mut String, alert: &Alert, level: Level, rule: &str, correct
 fn certainty(level: Level, rule: &str) -> &'static str {
     if level == Level::Unknown {
         "Unknown"
-    } else if rule == "critical-velocity" || rule.ends_with("-threshold") {
+    } else if is_observed(rule) {
         "Observed"
     } else if level == Level::Orange {
         "Likely"

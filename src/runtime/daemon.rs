@@ -24,7 +24,7 @@ use crate::store::{Position, Store, StoreError, Verified};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::signal::unix::Signal;
 use tokio::sync::watch;
 use tokio::time::{Interval, MissedTickBehavior};
 
@@ -43,6 +43,8 @@ const TICK: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub struct Daemon {
     pub(super) config: Config,
+    /// See [`reload::read_by_hooks`].
+    read_by_hooks: u64,
     pub(super) store: Arc<Store>,
     /// The site.
     pub site: Site,
@@ -51,7 +53,7 @@ pub struct Daemon {
     /// What shows how it is.
     pub pulse: Reporting,
     /// The host's clock.
-    wall: fn() -> Timestamp,
+    host_time: fn() -> Timestamp,
     /// Once, and as of the last batch: a logger that was away hands in its backlog in several.
     is_caught_up: bool,
     is_up_to_date: bool,
@@ -88,22 +90,23 @@ pub(super) fn dispatcher(
 }
 
 impl Daemon {
-    /// The daemon on a site that has been resumed from `store`; `wall` is the host's clock.
+    /// The daemon on a site that has been resumed from `store`; `host_time` is the host's clock.
     pub fn new(
         config: &Config,
         store: Arc<Store>,
         site: Site,
         sources: Sources,
         pulse: Reporting,
-        wall: fn() -> Timestamp,
+        host_time: fn() -> Timestamp,
     ) -> Self {
         Self {
             config: config.clone(),
+            read_by_hooks: reload::read_by_hooks(config),
             store,
             site,
             sources,
             pulse,
-            wall,
+            host_time,
             is_caught_up: false,
             is_up_to_date: false,
             files_are_read: false,
@@ -122,12 +125,12 @@ impl Daemon {
     pub(super) async fn work(
         &mut self,
         shutdown: Shutdown,
+        mut hangup: Signal,
         progress: &watch::Sender<Progress>,
     ) -> Result<(), StoreError> {
         self.note_closed()?;
         self.config_is_taken();
         self.keep_faults();
-        let mut hangup = signal(SignalKind::hangup())?;
         let (mut tick, mut asked) = (Self::ticks(), shutdown.clone());
         loop {
             self.pulse.turn();
@@ -244,7 +247,7 @@ impl Daemon {
             return Ok(());
         }
         let stopwatch = Stopwatch::start();
-        let events = self.site.caught_up((self.wall)())?;
+        let events = self.site.caught_up((self.host_time)())?;
         self.pulse.vitals.judged(&events, stopwatch.elapsed());
         if !self.is_caught_up {
             self.is_caught_up = true;
@@ -308,7 +311,7 @@ impl Daemon {
 
     /// Takes what was held for the clock; what files say of their positions counts once nothing is held.
     fn release(&mut self) -> Result<(), StoreError> {
-        let events = self.site.release((self.wall)())?;
+        let events = self.site.release((self.host_time)())?;
         self.pulse.vitals.note(&events);
         if self.holds_nothing() {
             let positions = std::mem::take(&mut self.positions);
@@ -321,7 +324,7 @@ impl Daemon {
 
     /// All that came together has been seen.
     fn decide(&mut self) {
-        let events = self.site.decide((self.wall)());
+        let events = self.site.decide((self.host_time)());
         self.pulse.vitals.note(&events);
     }
 
@@ -358,7 +361,7 @@ impl Daemon {
         let events = self.site.look_back();
         self.pulse.vitals.judged(&events, stopwatch.elapsed());
         if owed_past && !self.site.owes_past() {
-            tracing::info!("the past before the first start has been gone through");
+            tracing::info!("the history before the first start has been judged");
         }
         self.commit()
     }
@@ -366,7 +369,7 @@ impl Daemon {
     fn take(&mut self, arrival: &Arrival) -> Result<(), StoreError> {
         let stopwatch = Stopwatch::start();
         let taken = self.site.counts().taken;
-        let events = self.site.take(arrival, (self.wall)())?;
+        let events = self.site.take(arrival, (self.host_time)())?;
         let vitals = &self.pulse.vitals;
         let is_taken = self.site.counts().taken > taken;
         if is_taken && let Input::Reading { benchmark, .. } = &arrival.input {
@@ -380,9 +383,9 @@ impl Daemon {
 
     /// An alert does not wait for the rest of the batch; those that come together go together.
     fn commit_what_is_urgent(&mut self) -> Result<(), StoreError> {
-        if self.since_commit.elapsed() >= URGENT && self.site.is_urgent((self.wall)()) {
+        if self.since_commit.elapsed() >= URGENT && self.site.is_urgent((self.host_time)()) {
             self.since_commit = Stopwatch::start();
-            return self.site.commit((self.wall)());
+            return self.site.commit((self.host_time)());
         }
         Ok(())
     }
@@ -393,12 +396,12 @@ impl Daemon {
             && self.site.uncommitted() < MOST_TOGETHER_WRITTEN
             && !self.site.is_waiting()
             && self.since_commit.elapsed() < URGENT
-            && !self.site.is_urgent((self.wall)())
+            && !self.site.is_urgent((self.host_time)())
     }
 
     fn commit(&mut self) -> Result<(), StoreError> {
         self.since_commit = Stopwatch::start();
-        let committed = self.site.commit((self.wall)());
+        let committed = self.site.commit((self.host_time)());
         let is_waiting = self.site.is_waiting();
         if committed.is_ok() && !is_waiting && self.holds_nothing() {
             self.pulse.vitals.has_taken();
@@ -407,7 +410,7 @@ impl Daemon {
         let (counts, queue) = (self.site.counts(), self.sources.batches.len());
         let (is_paused, searches) = (self.site.is_stalled(), self.site.searching());
         let held = self.site.held() as u64;
-        let silences = self.site.mutes((self.wall)());
+        let silences = self.site.mutes((self.host_time)());
         let is_in_place = self.store.is_in_place();
         self.note_state(committed.as_ref().err(), is_waiting, is_in_place);
         self.pulse.vitals.update(|health| {
@@ -452,7 +455,7 @@ impl Daemon {
     /// # Errors
     /// When the state cannot be used any more.
     pub fn tick(&mut self) -> Result<(), StoreError> {
-        let now = (self.wall)();
+        let now = (self.host_time)();
         self.take_orders()?;
         // Data time is the clock's only once the past has been read.
         if self.is_caught_up {

@@ -22,6 +22,7 @@ use crate::store::{Store, StoreError};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
+use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 
 /// Why the daemon ended other than by being asked to.
@@ -61,6 +62,8 @@ pub async fn run(
         folder: config.site.state_dir.clone(),
         source,
     };
+    // From the start on: until somebody listens the signal would end the process.
+    let hangup = signal(SignalKind::hangup()).map_err(|error| fail(error.into()))?;
     let store = Arc::new(Store::open(&config.site.state_dir).map_err(fail)?);
     if let Err(error) = shutdown::survive_the_file_limit() {
         tracing::warn!(%error, "a limit on the length of files would end this process");
@@ -92,7 +95,7 @@ pub async fn run(
     daemon.beside = Some(beside);
     daemon.note_inherited(config).map_err(fail)?;
     tracing::info!(site = name, state = %config.site.state_dir.display(), "started");
-    let worked = daemon.work(shutdown, progress).await;
+    let worked = daemon.work(shutdown, hangup, progress).await;
     let Daemon {
         site,
         sources,
@@ -125,7 +128,7 @@ pub async fn run(
     Ok(counts)
 }
 
-/// Shows how the benchmarks stood when the last events were written: until the steps since then are gone through again nothing newer is
+/// Shows how the benchmarks stood when the last events were written: until the steps since then are judged again nothing newer is
 /// known, and a benchmark that is unknown is not to look as if it were not.
 fn show_stored(config: &Config, store: &Store, vitals: &Vitals) -> Result<(), StoreError> {
     let read = store.benchmarks()?;

@@ -1,7 +1,7 @@
-//! Walls around a hook: it reads everything, and writes where it is allowed to.
+//! Limits where a hook may write (Landlock, of Linux); it may read everything.
 //!
 //! Landlock binds the process that asks for it and its children, so the daemon does not start a
-//! hook itself: it starts this program again, which walls itself in, starts the hook and waits for its
+//! hook itself: it starts this program again, which limits itself, starts the hook and waits for its
 //! end. What the hook has left at work is this one's meanwhile, whatever it has done to be nobody's.
 
 use super::descendants::kill_descendants;
@@ -27,15 +27,15 @@ pub const OURSELVES: &str = "/proc/self/exe";
 /// Where every hook may write.
 const ALWAYS_WRITABLE: [&str; 2] = ["/tmp", "/dev/null"];
 
-/// Whether the kernel holds the walls.
+/// How far the kernel limits where a hook may write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Walls {
+pub enum WriteLimits {
     /// All of them.
-    Whole,
+    Full,
     /// Some: an old kernel knows not every kind of write.
     Partial,
     /// None: the kernel has no landlock, or it is switched off.
-    Missing,
+    Unsupported,
 }
 
 /// A hook cannot be run: what the process ends with that was to run it, as a shell does.
@@ -59,11 +59,11 @@ pub enum SandboxError {
     },
 }
 
-/// Walls in this thread and its children; a writable path that is not there is passed over.
+/// Limits this thread and its children; a writable path that is not there is passed over.
 ///
 /// # Errors
 /// When a kernel that has landlock refuses.
-fn wall_in(writable: &[PathBuf]) -> Result<Walls, RulesetError> {
+fn limit_writes(writable: &[PathBuf]) -> Result<WriteLimits, RulesetError> {
     let always = ALWAYS_WRITABLE.iter().map(Path::new);
     let writable = always.chain(writable.iter().map(PathBuf::as_path));
     let status = Ruleset::default()
@@ -73,16 +73,19 @@ fn wall_in(writable: &[PathBuf]) -> Result<Walls, RulesetError> {
         .add_rules(path_beneath_rules(writable, AccessFs::from_all(KERNEL)))?
         .restrict_self()?;
     Ok(match status.ruleset {
-        RulesetStatus::FullyEnforced => Walls::Whole,
-        RulesetStatus::PartiallyEnforced => Walls::Partial,
-        RulesetStatus::NotEnforced => Walls::Missing,
+        RulesetStatus::FullyEnforced => WriteLimits::Full,
+        RulesetStatus::PartiallyEnforced => WriteLimits::Partial,
+        RulesetStatus::NotEnforced => WriteLimits::Unsupported,
     })
 }
 
-/// Whether this kernel would hold the walls; tried on a thread that then ends.
-pub fn probe() -> Walls {
-    let tried = std::thread::spawn(|| wall_in(&[])).join();
-    tried.ok().and_then(Result::ok).unwrap_or(Walls::Missing)
+/// How far this kernel would limit that; tried on a thread that then ends.
+pub fn probe() -> WriteLimits {
+    let tried = std::thread::spawn(|| limit_writes(&[])).join();
+    tried
+        .ok()
+        .and_then(Result::ok)
+        .unwrap_or(WriteLimits::Unsupported)
 }
 
 /// Says in the log how far `hooks` are kept from writing elsewhere.
@@ -91,19 +94,19 @@ pub fn announce(hooks: &[HookConfig]) {
         return;
     }
     match probe() {
-        Walls::Whole => tracing::info!("hooks can write only where they are allowed to"),
-        Walls::Partial => {
+        WriteLimits::Full => tracing::info!("hooks can write only where they are allowed to"),
+        WriteLimits::Partial => {
             tracing::warn!(
                 "an old kernel: hooks are kept from most writes elsewhere, not from all"
             );
         }
-        Walls::Missing => {
+        WriteLimits::Unsupported => {
             tracing::warn!("no landlock in this kernel: hooks can write wherever the daemon can");
         }
     }
 }
 
-/// The command that runs `hook`, walled in where it has a launcher.
+/// The command that runs `hook`, limited where it has a launcher.
 pub(super) fn command(hook: &HookConfig) -> tokio::process::Command {
     let (program, arguments) = (from_anywhere(&hook.program()), hook.run.iter().skip(1));
     let Some(launcher) = &hook.launcher else {
@@ -130,7 +133,7 @@ fn from_anywhere(path: &Path) -> PathBuf {
     }
 }
 
-/// Runs `program`, which may write below `writable`, in `/tmp` and to `/dev/null`, without walls where the kernel has none, and
+/// Runs `program`, which may write below `writable`, in `/tmp` and to `/dev/null`, without limits where the kernel has none, and
 /// ends as it does. What it leaves at work goes on where it went well, and is ended where not.
 ///
 /// # Errors
@@ -140,7 +143,7 @@ pub fn become_hook(
     program: &OsStr,
     arguments: &[OsString],
 ) -> Result<Infallible, SandboxError> {
-    wall_in(writable)?;
+    limit_writes(writable)?;
     // A kernel that refuses it leaves what detaches itself to others, as before.
     let _ = set_child_subreaper(true);
     // A hook that signals its own group does not signal this process.

@@ -21,7 +21,7 @@ pub(super) struct Searches {
 #[derive(Debug)]
 struct RunningSearch {
     job: SearchJob,
-    /// Nothing comes from it if the search broke off.
+    /// Nothing comes from it if the search failed.
     answer: Receiver<SearchFinding>,
 }
 
@@ -128,7 +128,7 @@ fn work(orders: &Mutex<Receiver<SearchOrder>>) {
             // Nobody waits any more when the site is closed.
             let _ = answer.send(finding);
         } else {
-            tracing::error!(benchmark = %job.benchmark, "the search broke off");
+            tracing::error!(benchmark = %job.benchmark, "the search failed");
         }
     }
 }

@@ -254,7 +254,17 @@ impl TakenOrders {
             if *order == OrderKind::Unsilence {
                 let place = &event.benchmark;
                 standing.retain(|(_, one)| place.is_some() && one.benchmark != *place);
-            } else if until.is_some_and(|until| lasts((given_at, until), now)) {
+                continue;
+            }
+            // The newest of a kind says how long, also when its own time is over.
+            if until.is_some() {
+                let is_other = |(_, one): &(i64, Event)| {
+                    one.benchmark != event.benchmark
+                        || !matches!(&one.kind, EventKind::Order { order: own, .. } if own == order)
+                };
+                standing.retain(is_other);
+            }
+            if until.is_some_and(|until| lasts((given_at, until), now)) {
                 standing.push((*number, event.clone()));
             }
         }

@@ -226,7 +226,7 @@ impl Store {
             let folder = folder.to_owned();
             return Err(StoreError::Missing { folder });
         }
-        // Not read-only: a log that a crash has left behind must be gone through first.
+        // Not read-only: a log that a crash has left behind must be judged first.
         let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
         let connection = Connection::open_with_flags(file, flags)?;
         connection.busy_timeout(PATIENCE)?;

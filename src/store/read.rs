@@ -3,7 +3,7 @@
 use super::sealed::unseal;
 use super::series::{Catalogue, StoredSeries};
 use super::{Store, StoreError, access, timestamp};
-use crate::monitor::{Input, MemoryPart, Notice, Order, SearchFinding, Settings};
+use crate::monitor::{Input, MemoryPart, Notice, Order, SearchFinding, Settings, from_bytes};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp};
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, params};
@@ -91,7 +91,7 @@ pub(super) fn decode(body: Option<Vec<u8>>) -> Result<Input, StoreError> {
     let Some(body) = body else {
         return Ok(Input::Tick);
     };
-    let stored = rmp_serde::from_slice(&body);
+    let stored = from_bytes(&body);
     Ok(
         match stored.map_err(|error| StoreError::Unreadable(error.to_string()))? {
             StoredInput::Settings(settings) => Input::Settings(settings),
@@ -125,7 +125,7 @@ impl Store {
             if body.is_none() {
                 tracing::warn!(
                     name,
-                    "this part of the memory is not what was written: it is made again"
+                    "this part of the saved state is damaged: it is computed again"
                 );
                 return Ok(Recorded::default());
             }

@@ -105,7 +105,10 @@ fn a_heartbeat_is_checked_as_a_webhook_is() {
         ),
         (
             "url = \"http://a/b\"\nca_file = \"a.pem\"",
-            ["site.toml:12:11", "heartbeat.ca_file without TLS"],
+            [
+                "site.toml:12:11",
+                "heartbeat.ca_file is not used without TLS",
+            ],
         ),
         ("every = \"1m\"", ["site.toml:10", "heartbeat.url"]),
     ] {
@@ -203,7 +206,10 @@ fn a_topic_that_alerts_cannot_be_published_to_is_refused() {
         ),
         (
             "url = \"mqtt://a:1\"\ntopic = \"a\"\nca_file = \"b\"",
-            ["site.toml:13:11", "mqtt_out.ca_file without TLS"],
+            [
+                "site.toml:13:11",
+                "mqtt_out.ca_file is not used without TLS",
+            ],
         ),
     ] {
         let said = problem(&format!("[[mqtt_out]]\n{lines}\n"));
@@ -320,7 +326,7 @@ fn the_least_config_is_taken_with_the_defaults() {
         slipwatch::monitor::Settings {
             site: Some(slipwatch::monitor::SiteLevel::Worst),
             watched: slipwatch::monitor::Watched {
-                open: [("logger".to_owned(), String::new())].into(),
+                open: [("logger".to_owned(), "; written as usual".to_owned())].into(),
                 ..slipwatch::monitor::Watched::default()
             },
             ..slipwatch::monitor::Settings::default()
@@ -511,7 +517,8 @@ fn a_policy_that_cannot_mean_anything_is_a_warning() {
     let warning = |keys: &str| {
         let text = format!("{RIGHT}[alert]\n{keys}\n");
         let config = config::parse(&text, Path::new("site.toml")).unwrap();
-        config.warnings[0].to_string()
+        let each: Vec<String> = config.warnings.iter().map(ToString::to_string).collect();
+        each.join("\n")
     };
     assert_eq!(
         warning("evacuation_time = \"20d\"\noutlook = \"30d\""),
@@ -523,6 +530,31 @@ fn a_policy_that_cannot_mean_anything_is_a_warning() {
         "site.toml:11:19: warning: red_within 6h is shorter than evacuation_time 12h: red would be \
          called too late; leave red_within out: it is twice evacuation_time then"
     );
+    for (keys, part) in [
+        (
+            "red_chance = 0.9999",
+            "red_chance 0.9999 is so high that few collapses are called in time; leave it out: it is 0.27 then",
+        ),
+        ("orange_chance = 0.99", "leave it out: it is 0.7 then"),
+        (
+            "critical_velocity = \"0.01 mm/day\"",
+            "critical_velocity 0.01 mm/day: slopes creep faster than that for years",
+        ),
+        (
+            "critical_velocity = \"1000 m/day\"",
+            "few slopes are ever read at such a velocity",
+        ),
+        (
+            "[[hook]]\nrun = [\"./notify.sh\"]\ntimeout = \"30d\"",
+            "hook.timeout 720h: while an attempt hangs for so long",
+        ),
+    ] {
+        let said = warning(keys);
+        assert!(said.contains(part), "{said}");
+    }
+    let usual = format!("{RIGHT}[alert]\nred_chance = 0.4\ncritical_velocity = \"2 m/day\"\n");
+    let config = config::parse(&usual, Path::new("site.toml")).unwrap();
+    assert!(config.warnings.is_empty(), "{:?}", config.warnings);
 }
 
 #[test]

@@ -46,7 +46,10 @@ fn run(office: &Office) {
     let daemon = office.run_logged(&["run", "site.toml"]);
     office.until("all is read", || office.log().contains("caught up"));
     office.until("the past is gone through", || {
-        office.log().contains("has been gone through") || !office.log().contains("of=0")
+        office
+            .log()
+            .contains("before the first start has been judged")
+            || !office.log().contains("of=0")
     });
     drop(daemon);
 }

@@ -210,7 +210,9 @@ fn the_end_of_an_alert_that_falls_into_a_silence_is_sent_after_it_and_a_red_keep
     let daemon = office.run_logged(&["run", "site.toml"]);
     // Until then the level is dated by the newest reading.
     office.until("the past", || {
-        office.log().contains("has been gone through")
+        office
+            .log()
+            .contains("before the first start has been judged")
     });
     let text = office.status_until("red, unknown");
     let status = json(&office, &STATUS);

@@ -174,54 +174,72 @@ fn a_file_that_was_truncated_and_has_grown_past_the_old_end_is_read_again() {
     assert_eq!(bench.news(), ["possible-gap", "5:2", "5:3", "5:4", "5:5"]);
 }
 
+/// 28 rows of one length, those of some days with values of their own.
+fn filled_in(days: std::ops::Range<u32>) -> String {
+    let row = |day: u32| {
+        let value = if days.contains(&day) {
+            f64::from(day)
+        } else {
+            0.5
+        };
+        format!("2017-06-{day:02}T00:00:00Z,{value:6.1}{}\n", " ".repeat(30))
+    };
+    HEADER.to_owned() + &(1..29).map(row).collect::<String>()
+}
+
 /// As `rsync --inplace` or a copy over it writes an export, with the rows of some days filled in and the last ones as before.
+fn write_over(file: &Path, text: &str) {
+    let before = fs::metadata(file).unwrap();
+    let mut opened = OpenOptions::new().write(true).open(file).unwrap();
+    opened.write_all(text.as_bytes()).unwrap();
+    // Also where the file system counts time in coarse steps.
+    let later = before.modified().unwrap() + Duration::from_secs(1);
+    opened.set_modified(later).unwrap();
+    let after = fs::metadata(file).unwrap();
+    assert_eq!((before.ino(), before.len()), (after.ino(), after.len()));
+}
+
+/// Whoever writes a file may not be done yet.
+fn news_in_time(bench: &mut Bench) -> Vec<String> {
+    let mut news = bench.news();
+    while news.is_empty() {
+        std::thread::sleep(Duration::from_millis(50));
+        news = bench.news();
+    }
+    news
+}
+
 #[test]
 fn rows_that_are_filled_in_earlier_in_a_file_are_read_also_after_a_restart() {
-    let rows = |filled: std::ops::Range<u32>| {
-        let row = |day: u32| {
-            let value = if filled.contains(&day) {
-                f64::from(day)
-            } else {
-                0.5
-            };
-            format!("2017-06-{day:02}T00:00:00Z,{value:6.1}{}\n", " ".repeat(30))
-        };
-        (1..29).map(row).collect::<String>()
-    };
     for is_down in [false, true] {
         let mut bench = Bench::new("csv");
-        bench.write("5.csv", &format!("{HEADER}{}", rows(1..8)));
+        bench.write("5.csv", &filled_in(1..8));
         assert_eq!(bench.news().len(), 28);
-        let place = |bench: &Bench| fs::metadata(bench.path("5.csv")).unwrap();
-        let before = place(&bench);
-        let mut file = OpenOptions::new()
-            .write(true)
-            .open(bench.path("5.csv"))
-            .unwrap();
-        file.write_all(format!("{HEADER}{}", rows(1..16)).as_bytes())
-            .unwrap();
-        // Also where the file system counts time in coarse steps.
-        let later = before.modified().unwrap() + Duration::from_secs(1);
-        file.set_modified(later).unwrap();
-        assert_eq!(
-            (before.ino(), before.len()),
-            (place(&bench).ino(), place(&bench).len())
-        );
+        write_over(&bench.path("5.csv"), &filled_in(1..16));
         if is_down {
             bench.restart();
         }
-        // Whoever writes it may not be done yet.
-        let mut news = bench.news();
-        while news.is_empty() {
-            std::thread::sleep(Duration::from_millis(50));
-            news = bench.news();
-        }
+        let news = news_in_time(&mut bench);
         assert_eq!(news.len(), 28, "{is_down}: {news:?}");
         assert_eq!(news[14], "5:15");
         bench.append("5.csv", &row(29, 29.0));
         assert_eq!(bench.news(), ["5:29"]);
         assert!(bench.faults.is_empty(), "{:?}", bench.faults);
     }
+}
+
+#[test]
+fn rows_that_are_filled_in_before_others_are_added_are_read_after_a_restart() {
+    let mut bench = Bench::new("csv");
+    bench.write("5.csv", &filled_in(1..8));
+    assert_eq!(bench.news().len(), 28);
+    write_over(&bench.path("5.csv"), &filled_in(1..16));
+    assert!(bench.news().is_empty(), "it may not be written yet");
+    bench.append("5.csv", &row(29, 29.0));
+    assert_eq!(bench.news(), ["5:29"]);
+    bench.restart();
+    let news = news_in_time(&mut bench);
+    assert_eq!((news.len(), news[14].as_str()), (29, "5:15"), "{news:?}");
 }
 
 #[test]

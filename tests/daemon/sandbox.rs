@@ -1,11 +1,11 @@
-//! Hooks within walls, run for real through the program that walls itself in.
+//! Hooks that may write only where they are allowed to, run for real.
 
 use crate::webhooks::alert;
 use slipwatch::alert::Level;
 use slipwatch::config::{ExtraMessages, HookConfig};
 use slipwatch::runtime::deliver;
 use slipwatch::runtime::hook::HookOutcome;
-use slipwatch::runtime::sandbox::{self, Walls};
+use slipwatch::runtime::sandbox::{self, WriteLimits};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ fn folder_outside_tmp() -> Option<TempDir> {
     places.find_map(|place| tempfile::tempdir_in(place).ok())
 }
 
-fn walled(folder: &Path, run: &[&str]) -> HookConfig {
+fn limited(folder: &Path, run: &[&str]) -> HookConfig {
     HookConfig {
         extra: ExtraMessages::default(),
         links: None,
@@ -51,7 +51,7 @@ fn walled(folder: &Path, run: &[&str]) -> HookConfig {
 #[tokio::test]
 #[cfg_attr(not(has_landlock), ignore = "this kernel has no landlock")]
 async fn a_hook_writes_where_it_may_and_nowhere_else() {
-    assert_ne!(sandbox::probe(), Walls::Missing);
+    assert_ne!(sandbox::probe(), WriteLimits::Unsupported);
     let all = folder_outside_tmp().unwrap();
     let at = all.path();
     for name in ["own", "elsewhere", "allowed"] {
@@ -65,7 +65,7 @@ async fn a_hook_writes_where_it_may_and_nowhere_else() {
                   (eval \"$try\") 2>/dev/null && echo \"$try\" >> done\ndone\n\
                   cat ../elsewhere/there > read\n";
     fs::write(at.join("own/hook.sh"), script).unwrap();
-    let mut hook = walled(&at.join("own"), &["/bin/sh", "hook.sh"]);
+    let mut hook = limited(&at.join("own"), &["/bin/sh", "hook.sh"]);
     hook.writable = vec![at.join("allowed"), at.join("not-there")];
     assert_eq!(
         deliver::run(&hook, &alert("5", "5/red/1"), 1).await,
@@ -89,7 +89,7 @@ async fn walls_change_neither_the_arguments_nor_the_environment_nor_stdin() {
     run.extend(odd);
     let mut outcomes = Vec::new();
     for launcher in [true, false] {
-        let mut hook = walled(folder.path(), &run);
+        let mut hook = limited(folder.path(), &run);
         if !launcher {
             hook.launcher = None;
         }
@@ -108,13 +108,13 @@ async fn walls_change_neither_the_arguments_nor_the_environment_nor_stdin() {
 #[tokio::test]
 async fn a_hook_within_walls_that_is_missing_fails_and_one_that_hangs_is_killed() {
     let folder = folder();
-    let missing = walled(folder.path(), &["./not-there.sh"]);
+    let missing = limited(folder.path(), &["./not-there.sh"]);
     let outcome = deliver::run(&missing, &alert("5", "5/red/1"), 1).await;
     assert!(
         matches!(&outcome, HookOutcome::NotStarted(why) if why.contains("No such file")),
         "{outcome:?}"
     );
-    let mut hanging = walled(folder.path(), &["/bin/sh", "-c", "sleep 300 & sleep 300"]);
+    let mut hanging = limited(folder.path(), &["/bin/sh", "-c", "sleep 300 & sleep 300"]);
     hanging.timeout = Duration::from_millis(500);
     assert_eq!(
         deliver::run(&hanging, &alert("5", "5/red/1"), 1).await,
@@ -135,7 +135,7 @@ async fn a_hook_of_a_config_under_a_relative_path_is_found() {
     let mode = std::os::unix::fs::PermissionsExt::from_mode(0o755);
     fs::set_permissions(folder.path().join("hook.sh"), mode).unwrap();
     for launcher in [true, false] {
-        let mut hook = walled(relative, &["./hook.sh"]);
+        let mut hook = limited(relative, &["./hook.sh"]);
         if !launcher {
             hook.launcher = None;
         }
@@ -162,12 +162,12 @@ async fn a_hook_within_walls_ends_as_its_program_does_and_leaves_at_work_what_it
             HookOutcome::Failed(3),
         ),
     ] {
-        let hook = walled(folder.path(), &["/bin/sh", "-c", script]);
+        let hook = limited(folder.path(), &["/bin/sh", "-c", script]);
         let ended = deliver::run(&hook, &alert("5", "5/red/1"), 1).await;
         assert_eq!(ended, outcome, "{script}");
     }
     let script = "(env -i setsid sh -c 'sleep 1; touch later' > /dev/null 2>&1 &)\nexit 0";
-    let hook = walled(folder.path(), &["/bin/sh", "-c", script]);
+    let hook = limited(folder.path(), &["/bin/sh", "-c", script]);
     let ended = deliver::run(&hook, &alert("5", "5/red/1"), 1).await;
     assert_eq!(ended, HookOutcome::Done);
     for _ in 0..300 {

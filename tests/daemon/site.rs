@@ -57,7 +57,7 @@ impl Site {
         site.run();
         let start = Stopwatch::start();
         let log = || fs::read_to_string(site.folder.path().join("log")).unwrap();
-        while !log().contains("has been gone through") {
+        while !log().contains("before the first start has been judged") {
             assert!(start.elapsed() < LIMIT, "{}", log());
             std::thread::sleep(Duration::from_millis(100));
         }

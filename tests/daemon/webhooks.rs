@@ -538,7 +538,7 @@ fn a_config_says_what_is_wrong_with_a_webhook() {
         (webhook("/path", ""), "is neither http nor https"),
         (
             webhook("http://a/", "ca_file = \"ca.pem\""),
-            "webhook.ca_file without TLS",
+            "webhook.ca_file is not used without TLS",
         ),
         (webhook("http://me:secret@example.org/", ""), "password"),
         (

@@ -175,7 +175,11 @@ fn a_flipped_bit_in_the_memory_or_a_position_is_seen_and_both_are_made_anew() {
     }
     drop(database);
     site.caught_up().stop();
-    assert!(site.log().contains("it is made again"), "{}", site.log());
+    assert!(
+        site.log().contains("it is computed again"),
+        "{}",
+        site.log()
+    );
     assert!(
         site.log().contains("from its start again"),
         "{}",

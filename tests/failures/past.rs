@@ -179,3 +179,37 @@ fn a_row_and_its_correction_that_are_read_again_are_taken_once_and_a_value_corre
     program.stop();
     site.proven_events();
 }
+
+#[test]
+fn a_red_that_people_resolve_before_the_past_is_judged_stays_resolved_and_the_next_reading_calls_another()
+ {
+    let site = Site::new(
+        "[[benchmark]]\nid = \"5\"\nsource = \"logger\"\n[alert]\n\
+         [[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"50 mm\"\n",
+    );
+    let start = clock::now() - SignedDuration::from_hours(1000);
+    let rows: String = (0..1000)
+        .map(|row| {
+            let time = start + SignedDuration::from_hours(i64::from(row));
+            format!("{time},{:.2}\n", 0.01 * f64::from(row))
+        })
+        .collect();
+    site.append("incoming/5.csv", &format!("{HEADER}{rows}"));
+    let program = site.caught_up();
+    let is_judged = || {
+        site.log()
+            .contains("before the first start has been judged")
+    };
+    site.append("incoming/5.csv", &format!("{},110\n", clock::now()));
+    eventually("its red", || site.notified("5/red/", "firing") == 1);
+    let order = ["alerts", "resolve", "--benchmark", "5", "--by", "q"];
+    let why = ["--why", "a rockfall hit the wire", "--config", "site.toml"];
+    site.printed(&[&order[..], &why].concat());
+    eventually("its end", || site.notified("5/red/", "resolved") == 1);
+    assert!(!is_judged(), "the past is too short for this test");
+    eventually("the past", is_judged);
+    site.append("incoming/5.csv", &format!("{},111\n", clock::now()));
+    eventually("red again", || site.notified("5/red/", "firing") == 2);
+    program.stop();
+    site.proven_events();
+}

@@ -210,10 +210,18 @@ fn another_source_is_another_instrument_and_its_zero_is_no_motion() {
 fn a_reload_that_leaves_the_hooks_as_they_are_does_not_wait_for_one_that_runs() {
     let slow = "[[hook]]\nrun = [\"/bin/sh\", \"slow.sh\"]\nlevels = [\"red\"]\n\
                 timeout = \"60s\"\nbenchmarks = [\"b\"]\n";
+    // Nobody listens there; what it takes when it is set up stays as it is.
+    let webhook = "[[webhook]]\nurl = \"http://127.0.0.1:9/x\"\nsecret_file = \"webhook.secret\"\nbenchmarks = [\"b\"]\n";
+    let slow = format!("{slow}{webhook}");
     let each = format!("{}{}", benchmark("b", ""), benchmark("c", ""));
     let site = Site::new(&format!("{each}{slow}{POLICY}"));
     let script = "touch begun; sleep 15; touch ended\n";
     fs::write(site.path("slow.sh"), script).unwrap();
+    fs::write(
+        site.path("webhook.secret"),
+        "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw",
+    )
+    .unwrap();
     let program = site.caught_up();
     let text = |name: &str| format!("time,{name}_displacement_mm\n{}", failing(0..114));
     site.append("incoming/x.csv", &text("b"));
@@ -326,4 +334,174 @@ fn rows_out_of_order_come_anew_with_the_others_also_after_a_restart() {
     site.caught_up().stop();
     assert_eq!((of("a"), of("b")), (114, 228));
     site.proven_events();
+}
+
+/// A source beside the usual ones, with a benchmark `b` of its own.
+fn east(keys: &str) -> String {
+    format!(
+        "[[source]]\nid = \"east\"\nkind = \"csv\"\npath = \"east/*.csv\"\n{keys}\n\
+         [[benchmark]]\nid = \"b\"\nsource = \"east\"\n"
+    )
+}
+
+/// Rows each hour up to now, of which the value is that of the row's number.
+fn rows_of(count: i32, value: impl Fn(i32) -> f64) -> String {
+    let rows = failing(114 - count..114);
+    let rows = rows.lines().zip(0..).map(|(line, row)| {
+        let (time, _) = line.split_once(',').unwrap();
+        format!("{time},{:.3}\n", value(row))
+    });
+    rows.collect()
+}
+
+const FAR: &str = "[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"50 mm\"\n";
+
+#[test]
+fn a_source_that_is_taken_out_and_put_back_is_read_from_its_start() {
+    for restarts in [false, true] {
+        let without = format!("{}{POLICY}", benchmark("a", ""));
+        let with = format!("{}{}{POLICY}", benchmark("a", ""), east(""));
+        let site = Site::new(&with);
+        fs::create_dir(site.path("east")).unwrap();
+        site.append("east/b.csv", &format!("{HEADER}{}", failing(0..114)));
+        let mut program = Some(site.caught_up());
+        eventually("b's red", || site.notified("b/red/", "firing") == 1);
+        let mut change = |more: &str| {
+            if restarts {
+                program.take().unwrap().stop();
+                site.configure(more);
+                program = Some(site.caught_up());
+            } else {
+                reload(&site, program.as_ref().unwrap(), more);
+            }
+        };
+        change(&without);
+        eventually("the end", || site.notified("b/red/", "resolved") == 1);
+        change(&with);
+        eventually("red again", || site.notified("b/red/2/", "firing") == 1);
+        program.unwrap().stop();
+        site.proven_events();
+    }
+}
+
+#[test]
+fn rows_that_were_set_aside_are_read_when_the_config_says_how_they_are_written() {
+    let site = Site::new(&format!("{}{POLICY}", east("")));
+    fs::create_dir(site.path("east")).unwrap();
+    let rows = failing(0..114);
+    let rows = rows.lines().map(|line| {
+        let (time, value) = line.split_once(',').unwrap();
+        format!("{time};{}\n", value.replace('.', ","))
+    });
+    let header = HEADER.replace(',', ";");
+    site.append("east/b.csv", &(header + &rows.collect::<String>()));
+    let program = site.caught_up();
+    eventually("that they are set aside", || {
+        site.log().contains("for a decimal comma")
+    });
+    assert!(site.values().is_empty());
+    reload(
+        &site,
+        &program,
+        &format!("{}{POLICY}", east("decimal = \",\"")),
+    );
+    eventually("b's red", || site.notified("b/red/", "firing") == 1);
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
+fn codes_that_the_config_names_later_are_no_readings_any_more() {
+    let site = Site::new(&format!("{}{POLICY}{FAR}", east("")));
+    fs::create_dir(site.path("east")).unwrap();
+    let creep = rows_of(100, |row| {
+        if row == 0 {
+            -9999.0
+        } else {
+            0.04 * f64::from(row)
+        }
+    });
+    site.append("east/b.csv", &format!("{HEADER}{creep}"));
+    let program = site.caught_up();
+    eventually("the false red", || site.notified("b/red/", "firing") == 1);
+    reload(
+        &site,
+        &program,
+        &format!("{}{POLICY}{FAR}", east("missing = [-9999]")),
+    );
+    eventually("them anew", || site.values().len() >= 199);
+    let why = ["--by", "q", "--why", "a code", "--config", "site.toml"];
+    site.printed(&[&["alerts", "resolve", "--benchmark", "b"], &why[..]].concat());
+    eventually("the end", || site.notified("b/red/", "resolved") == 1);
+    site.append("east/b.csv", &format!("{},4.1\n", clock::now()));
+    eventually("the next reading", || site.values().len() >= 200);
+    program.stop();
+    assert_eq!(site.notified("b/red/", "firing"), 1, "{}", site.events());
+    site.proven_events();
+}
+
+#[test]
+fn an_export_that_is_issued_again_with_another_zero_calls_no_red() {
+    let site = Site::new(&format!("{}{POLICY}{FAR}", benchmark("b", "")));
+    let export = |zero: f64| {
+        format!(
+            "{HEADER}{}",
+            rows_of(100, |row| zero + 0.04 * f64::from(row))
+        )
+    };
+    site.append("incoming/b.csv", &export(100.0));
+    let program = site.caught_up();
+    eventually("the readings", || site.values().len() >= 100);
+    for zero in [20.0, 180.0] {
+        site.append("new", &export(zero));
+        let known = site.values().len();
+        fs::rename(site.path("new"), site.path("incoming/b.csv")).unwrap();
+        eventually("them anew", || site.values().len() >= known + 100);
+    }
+    program.stop();
+    assert_eq!(site.notified("b/red/", ""), 0, "{}", site.events());
+    site.proven_events();
+}
+
+#[test]
+fn a_hook_that_asks_for_less_than_before_receives_the_end_of_what_it_was_told() {
+    let second = |keys: &str| {
+        format!(
+            "{}{POLICY}[[hook]]\nrun = [\"/bin/sh\", \"second.sh\"]\n{keys}\n",
+            benchmark("b", "")
+        )
+    };
+    let site = Site::new(&second("levels = [\"red\"]"));
+    let script = "echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> second\n";
+    fs::write(site.path("second.sh"), script).unwrap();
+    site.append("incoming/b.csv", &format!("{HEADER}{}", failing(0..114)));
+    let program = site.caught_up();
+    let has = |state: &str| {
+        site.lines("second")
+            .iter()
+            .any(|line| line.ends_with(state))
+    };
+    eventually("its red", || has("firing"));
+    reload(
+        &site,
+        &program,
+        &second("levels = [\"orange\"]\nbenchmarks = [\"a\"]"),
+    );
+    let why = ["--by", "q", "--why", "a test", "--config", "site.toml"];
+    site.printed(&[&["alerts", "resolve", "--all"], &why[..]].concat());
+    eventually("its end", || has("resolved"));
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
+fn a_reload_that_is_asked_for_while_the_daemon_starts_does_not_end_it() {
+    let site = Site::new(&format!("{}{POLICY}", benchmark("b", "")));
+    site.append("incoming/b.csv", &format!("{HEADER}{}", failing(0..114)));
+    let program = site.start(&[]);
+    eventually("the state", || site.path("state").exists());
+    program.signal(Signal::SIGHUP);
+    eventually("b's red", || site.notified("b/red/", "firing") == 1);
+    eventually("the config", || site.log().contains("the config is taken"));
+    program.stop();
 }

@@ -179,11 +179,21 @@ fn a_silence_has_a_longest_time_and_an_end_and_is_seen_everywhere() {
     eventually("in the metrics", || {
         shown("/metrics").contains("slipwatch_silences 1")
     });
+    let until = || {
+        let all = shown("/metrics");
+        let line = all
+            .lines()
+            .find_map(|line| line.strip_prefix("slipwatch_silenced_until_timestamp_seconds "));
+        line.map_or(0.0, |text| text.parse::<f64>().unwrap())
+    };
+    let long = until();
+    assert!(alerts(&["silence", "--for", "1h"]).status.success());
+    eventually("the later one says how long", || until() < long - 3000.0);
     assert!(shown("/api/status").contains("\"silences\":[{"));
     assert!(site.log().contains("Silence"), "{}", site.log());
     for words in [&["status"][..], &["alerts", "list"]] {
         let said = site.printed(&[words, &["--config", "site.toml"]].concat());
-        assert!(said.contains("silence until"), "{said}");
+        assert_eq!(said.matches("silence until").count(), 1, "{said}");
     }
     site.append("incoming/5.csv", &failing(8..114));
     eventually("a red", || site.events().contains("\"level\":\"red\""));

@@ -212,6 +212,7 @@ fn a_row_more_in_the_table_is_a_rival_more_on_the_scorecard() {
     let tomorrow = Method {
         name: "tomorrow",
         source: "this test",
+        needs_flow: false,
         forecast: |_| Some(Passage::from_times(vec![(1.0, 1.0)])),
     };
     let methods = [METHODS[0], tomorrow];

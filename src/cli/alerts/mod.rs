@@ -11,7 +11,7 @@ use super::state::{SiteArgs, is_known, no_benchmark};
 use super::text;
 use crate::alert::Level;
 use crate::config::{Config, EXERCISE, value};
-use crate::monitor::{EventKind, Given, Order, OrderedBy};
+use crate::monitor::{EventKind, Given, Order, OrderedBy, from_bytes};
 use crate::reading::BenchmarkId;
 use crate::runtime::alarm_state::Alarms;
 use crate::runtime::clock;
@@ -332,7 +332,7 @@ pub(super) struct Redelivered {
 
 /// Whether this is the beginning of an alert that is not in force any more, by the keys of those that are.
 fn is_over(body: &[u8], in_force: &BTreeSet<String>) -> bool {
-    let Ok(alert) = rmp_serde::from_slice::<Alert>(body) else {
+    let Ok(alert) = from_bytes::<Alert>(body) else {
         return false;
     };
     let stands = match &alert.many {

@@ -5,9 +5,9 @@ use crate::cli::run::asynchronous;
 use crate::config::Token;
 use crate::monitor::{Settings, SiteLevel, Watched};
 use crate::reading::{BenchmarkId, Recording};
-use crate::runtime::exhibit::{Exhibit, show};
 use crate::runtime::replay;
 use crate::runtime::serve::{Limits, ListenOptions};
+use crate::runtime::served_replay::{ServedReplay, show};
 use crate::runtime::shutdown::Shutdown;
 use crate::runtime::view::{Ending, Facts, Now};
 use anyhow::Context;
@@ -41,7 +41,7 @@ pub(super) fn serve(args: &Args, listen: SocketAddr, folder: &Path) -> anyhow::R
     let token = folder.join("token");
     std::fs::write(&token, TOKEN).with_context(|| format!("cannot write {}", token.display()))?;
     let hooks = [sample_hook(folder)?];
-    let exhibit = Exhibit {
+    let served_replay = ServedReplay {
         hooks: &hooks,
         recording: &recording,
         settings: Settings {
@@ -83,7 +83,7 @@ pub(super) fn serve(args: &Args, listen: SocketAddr, folder: &Path) -> anyhow::R
     };
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
-        show(exhibit, &folder.join("state"), shutdown, &mut opened).await?;
+        show(served_replay, &folder.join("state"), shutdown, &mut opened).await?;
         anyhow::Ok(())
     })?;
     show_hook(&mut std::io::stdout().lock(), folder)

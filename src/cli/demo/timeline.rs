@@ -1,9 +1,9 @@
 //! A crisis as it unfolds: a line for each change of a level, with its reason; then velocity, level and forecast as marks.
 
 use super::marks::{self, MarkScale};
-use crate::alert::{Level, Policy, percent_in_words};
+use crate::alert::{Level, Policy, hours_in_words, percent_in_words};
 use crate::cli::text::plain;
-use crate::monitor::{AlertState, Event, EventKind, FailureTime};
+use crate::monitor::{AlertState, Event, EventKind, FailureTime, LevelChance};
 use crate::reading::{BenchmarkId, Timestamp, days_since, figure};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -50,6 +50,8 @@ struct DemoMoment {
     time: Timestamp,
     velocity_mm_per_day: Option<f64>,
     within_evacuation: f64,
+    /// What red is called by; `None` in states of older versions.
+    red: Option<LevelChance>,
     within_outlook: f64,
     failure: FailureTime,
     level: Level,
@@ -99,6 +101,7 @@ impl Timeline {
             velocity_mm_per_day,
             chance_within_evacuation_time,
             chance_within_outlook,
+            called,
             ..
         } = &event.kind
         {
@@ -107,6 +110,7 @@ impl Timeline {
                 time: event.time,
                 velocity_mm_per_day: *velocity_mm_per_day,
                 within_evacuation: *chance_within_evacuation_time,
+                red: called.as_ref().map(|called| called.red),
                 within_outlook: *chance_within_outlook,
                 failure: *failure_time,
                 level: record.level.unwrap_or(Level::Green),
@@ -114,11 +118,7 @@ impl Timeline {
             return None;
         }
         let EventKind::Alert {
-            level,
-            state,
-            rule,
-            text,
-            ..
+            level, state, rule, ..
         } = &event.kind
         else {
             return None;
@@ -148,7 +148,7 @@ impl Timeline {
         let (before, reason) = match fall {
             Some(fall) if fall.time == event.time => (None, words(&fall.rule)),
             other => {
-                let reason = reason(rule, text, record.moments.last());
+                let reason = reason(rule, record.moments.last());
                 (other.map(|fall| fall.line), reason)
             }
         };
@@ -253,7 +253,7 @@ impl DemoRecord {
 }
 
 /// Why a level was called: the velocity, and the chance that passed a threshold, or the rule in words.
-fn reason(rule: &str, text: &str, moment: Option<&DemoMoment>) -> String {
+fn reason(rule: &str, moment: Option<&DemoMoment>) -> String {
     let Some(moment) = moment.filter(|_| rule != "no-data") else {
         return words(rule);
     };
@@ -270,27 +270,15 @@ fn reason(rule: &str, text: &str, moment: Option<&DemoMoment>) -> String {
             format!("{chance} in 30 days{median}")
         }
         "chance-within-evacuation-time" => {
-            let (chance, span) = until_next(text).unwrap_or((moment.within_evacuation, "time"));
+            let (chance, span) = moment.red.map_or_else(
+                || (moment.within_evacuation, "time".to_owned()),
+                |red| (red.chance, hours_in_words(red.within())),
+            );
             format!("{} in {span}{median}", percent_in_words(chance))
         }
         other => words(other),
     };
     velocity + &why
-}
-
-/// The chance by which red was called and the time that it is for, as the alert says them.
-fn until_next(text: &str) -> Option<(f64, &str)> {
-    let part = text
-        .split("; ")
-        .find(|part| part.contains("until the next reading ("))?;
-    let chance = part
-        .strip_prefix("chance ")?
-        .split(' ')
-        .next()?
-        .parse()
-        .ok()?;
-    let (_, span) = part.rsplit_once('(')?;
-    Some((chance, span.trim_end_matches(')')))
 }
 
 /// A rule in words.

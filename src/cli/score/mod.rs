@@ -202,7 +202,10 @@ fn report(
 
 /// Without a river the methods that weigh its flow have nothing to say.
 fn leave_out_rivers(card: &mut Card) {
-    let is_of_a_river = |name: &str| name.starts_with("river-");
+    let is_of_a_river = |name: &str| {
+        let mut flowing = METHODS.iter().filter(|method| method.needs_flow);
+        flowing.any(|method| method.name == name)
+    };
     card.methods.retain(|name| !is_of_a_river(name));
     let of_leads = card.leads.iter_mut().map(|lead| &mut lead.scores);
     let of_looks = card.looks.iter_mut().map(|look| &mut look.scores);

@@ -4,13 +4,13 @@ use super::hours;
 use crate::alert::{Level, Policy};
 use crate::cli::replay;
 use crate::monitor::{Event, Settings, levels_in};
-use crate::reading::{BenchmarkId, Channel, Recording, Series, Timestamp};
+use crate::reading::{BenchmarkId, Channel, DAYS_PER_YEAR, Recording, Series, Timestamp};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Hours in a year.
-const YEAR_HOURS: f64 = 365.25 * 24.0;
+const YEAR_HOURS: f64 = DAYS_PER_YEAR * 24.0;
 
 /// The levels in force over a record, up to the failure where there was one.
 #[derive(Debug, Clone, Default, PartialEq, JsonSchema, Serialize)]

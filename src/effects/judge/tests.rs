@@ -44,6 +44,7 @@ fn of_channel(name: &str, form: Form, mean_days: f64, gain: f64) -> Option<Strin
         form,
         stages: 1,
         mean_days,
+        before: 0.0,
     };
     let load = Act::Load(vec![vec![0.0; problem.nodes.len()]]);
     let term = Term {
@@ -236,6 +237,7 @@ fn no_event_is_judged_where_a_covariate_in_the_law_has_no_values() {
         form: Form::Level,
         stages: 1,
         mean_days: 5.0,
+        before: 0.0,
     };
     let through = Term {
         channel: Some(0),

@@ -1,10 +1,11 @@
 //! The year in the load.
 
 use crate::effects::act::Act;
-use crate::effects::definition::{EffectDefinition, EffectSize, SearchedRecord, Trying, YEAR};
+use crate::effects::definition::{EffectDefinition, EffectSize, SearchedRecord, Trying};
+use crate::reading::DAYS_PER_YEAR;
 
 /// A year and half a year, days.
-pub(super) const YEARLY: [f64; 2] = [YEAR, 0.5 * YEAR];
+pub(super) const YEARLY: [f64; 2] = [DAYS_PER_YEAR, 0.5 * DAYS_PER_YEAR];
 
 pub(in crate::effects) static SEASONAL: EffectDefinition = EffectDefinition {
     name: "seasonal",

@@ -1,7 +1,7 @@
 //! Several benchmarks' displacements at the same times, without jumps and stray readings.
 
 use crate::effects::quantiles::{median, robust_deviation};
-use crate::reading::{Quantity, SECONDS_PER_DAY, Series, Timestamp, days_since};
+use crate::reading::{Quantity, Series, Timestamp, days_of, days_since};
 
 /// Times in common that are worth having: more would follow noise, not motion.
 const MOST_TIMES: usize = 61;
@@ -81,9 +81,7 @@ fn path(series: &Series, epoch: Timestamp) -> AlignmentPath {
         Quantity::Displacement => values,
         Quantity::Velocity => {
             // A mean over the time before its stamp belongs to the middle of that time.
-            let late = series
-                .averaging
-                .map_or(0.0, |span| 0.5 * span.as_secs_f64() / SECONDS_PER_DAY);
+            let late = series.averaging.map_or(0.0, |span| 0.5 * days_of(span));
             let mut slip = 0.0;
             let mut path: AlignmentPath = Vec::with_capacity(values.len());
             for (index, (day, velocity)) in values.iter().enumerate() {

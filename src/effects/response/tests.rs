@@ -34,6 +34,7 @@ fn of(form: Form, stages: u8, mean_days: f64) -> Response {
         form,
         stages,
         mean_days,
+        before: 0.0,
     }
 }
 

@@ -32,7 +32,7 @@ pub struct Assumptions {
 }
 
 impl Assumptions {
-    /// A load that nobody declared may change, and the law with it: what the monitor goes by. The drift was learnt on
+    /// A load that nobody declared may change, and the law with it: what the monitor uses. The drift was learnt on
     /// Lanzada 2025, whose inverse velocity bends, and is no narrower for simulated slopes that keep the law exactly.
     pub const CHANGING_LOAD: Self = Self {
         drift: 0.2,

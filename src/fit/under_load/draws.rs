@@ -1,8 +1,8 @@
 //! Laws drawn from the posterior, between those of the table: what intervals of parameters are made of.
 
 use super::assumptions::Assumptions;
+use super::population::{DrawnLaw, Population};
 use super::search::GridSearch;
-use super::walk::{DrawnLaw, Walk};
 use super::{Ensemble, FEWEST, LawSample};
 use crate::fit::Rate;
 use crate::model::Law;
@@ -68,25 +68,30 @@ impl LawDraws {
         }
         let mut search = GridSearch::new(rates, assumed);
         let cells = search.cells(rates)?;
-        let mut walk = Walk::about(&cells, search)?;
-        let mut drawn = draw(&mut walk, false);
-        let mut suffices = suffices(&mut walk, &drawn);
+        let mut population = Population::about(&cells, search)?;
+        let mut drawn = draw(&mut population, false);
+        let mut suffices = suffices(&mut population, &drawn);
         for _ in 0..AGAIN {
             if suffices && moved(&drawn) <= AT_REST {
                 break;
             }
             if !suffices {
-                walk.begin_again(likely);
+                population.begin_again(likely);
             }
-            drawn = draw(&mut walk, true);
-            suffices = self::suffices(&mut walk, &drawn);
+            drawn = draw(&mut population, true);
+            suffices = self::suffices(&mut population, &drawn);
         }
-        let draws = Self::from(&walk, &drawn, first.from, last.to)?;
+        let draws = Self::from(&population, &drawn, first.from, last.to)?;
         Some(Self { suffices, ..draws })
     }
 
-    fn from(walk: &Walk, drawn: &[DrawnLaw], from_days: f64, now_days: f64) -> Option<Self> {
-        let record = walk.record();
+    fn from(
+        population: &Population,
+        drawn: &[DrawnLaw],
+        from_days: f64,
+        now_days: f64,
+    ) -> Option<Self> {
+        let record = population.record();
         let count = record.from.len();
         let weight = 1.0 / drawn.len() as f64;
         let variance = drawn.iter().map(|one| one.variance).sum::<f64>() * weight;
@@ -105,7 +110,7 @@ impl LawDraws {
             },
             from_days,
             spans_days: spans.collect(),
-            evaluations: walk.evaluations(),
+            evaluations: population.evaluations(),
             suffices: true,
         })
     }
@@ -129,22 +134,22 @@ impl LawDraws {
 }
 
 /// Lets the population come to rest, for longer where it is there again, and then takes it now and then.
-fn draw(walk: &mut Walk, again: bool) -> Vec<DrawnLaw> {
+fn draw(population: &mut Population, again: bool) -> Vec<DrawnLaw> {
     let before = if again { BEFORE_AGAIN } else { BEFORE };
     for round in 1..=before {
-        walk.round();
+        population.round();
         if round.is_multiple_of(DOUBTED) {
-            walk.doubt();
+            population.doubt();
             if again && round < before {
-                walk.leave_behind();
+                population.leave_behind();
             }
         }
     }
     let mut drawn: Vec<DrawnLaw> = Vec::new();
     for round in 1..=AFTER {
-        walk.round();
+        population.round();
         if round.is_multiple_of(TAKEN) {
-            drawn.extend(walk.draw());
+            drawn.extend(population.draw());
         }
     }
     drawn
@@ -161,7 +166,7 @@ fn moved(drawn: &[DrawnLaw]) -> f64 {
 }
 
 /// Whether what was drawn are different laws, not far from rest, and no likelier one is known.
-fn suffices(walk: &mut Walk, drawn: &[DrawnLaw]) -> bool {
+fn suffices(population: &mut Population, drawn: &[DrawnLaw]) -> bool {
     let different: BTreeSet<u64> = drawn.iter().map(|one| one.ln.to_bits()).collect();
     let whole = mean_ln(drawn);
     let squares = drawn.iter().map(|one| (one.ln - whole).powi(2));
@@ -171,7 +176,7 @@ fn suffices(walk: &mut Walk, drawn: &[DrawnLaw]) -> bool {
     different.len() >= FEWEST_DIFFERENT
         && moved(drawn) <= STILL_NARROWING
         && spread >= LEAST_SPREAD
-        && !walk.knows_likelier(best)
+        && !population.knows_likelier(best)
 }
 
 impl DrawnLaw {

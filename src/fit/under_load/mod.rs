@@ -1,5 +1,5 @@
 //! The posterior of the law. What is assumed of the load and of the scatter is an argument ([`Assumptions`]): it may have changed
-//! undeclared, which is what the monitor goes by, or it was constant, the special case that `fit` gives parameters of.
+//! undeclared, which is what the monitor uses, or it was constant, the special case that `fit` gives parameters of.
 //!
 //! The velocity is that of the law times e^f. Beside the law's parameters, three things are uncertain:
 //!
@@ -13,7 +13,7 @@
 //! filter that runs from the present into the past (`gains`), which gives the evidence of every start in one pass
 //! (`evidence`). What is left, the shape (p and the ratio of healing to acceleration), the slope r and the noise, is gone through
 //! in two ways. [`LoadPosterior`] runs over a table of shapes (`shape`) and a grid of ln r (`search`): deterministic and fast,
-//! for forecasts with every reading. [`LawDraws`] begins there and at the likeliest laws near them (`modes`), and draws laws between those of the table (`space`, `walk`):
+//! for forecasts with every reading. [`LawDraws`] begins there and at the likeliest laws near them (`modes`), and draws laws between those of the table (`space`, `population`):
 //! intervals of parameters need draws of what is continuous.
 //!
 //! Priors (`prior`): nearly uniform in ln r (falling as r^-0.1), from 1/(50 lengths of the record), and no more than
@@ -34,11 +34,11 @@ mod joined;
 mod modes;
 mod other_prior;
 mod past;
+mod population;
 mod prior;
 mod search;
 mod shape;
 mod space;
-mod walk;
 mod weigher;
 
 pub use assumptions::Assumptions;

@@ -7,6 +7,7 @@ use super::gains::{Gains, LoadMemory, LoadNoise, RateRecord};
 use super::prior::{RARE, SlopePrior};
 use super::shape::{BLOCKS, LANES, SHAPES};
 use crate::fit::{Rate, ReadingError};
+use crate::reading::upper_median;
 use std::collections::BTreeMap;
 
 /// Grids of the scatter of the readings, of the load's standard deviation, and of its memory over the span
@@ -342,8 +343,7 @@ fn record(rates: &[Rate], assumed: &Assumptions) -> RateRecord {
         }
     };
     let mut newest: Vec<f64> = rates.iter().rev().take(CENTRE).map(forward).collect();
-    newest.sort_by(f64::total_cmp);
-    let centre = newest[newest.len() / 2].ln();
+    let centre = upper_median(&mut newest).unwrap_or(AT_REST).ln();
     let mut record = RateRecord {
         ln_velocity: rates
             .iter()

@@ -16,6 +16,7 @@ use super::gains::{LoadNoise, RateRecord};
 use super::past::PastShape;
 use super::prior::{P_PRIOR, SlopePrior, above_kept};
 use crate::model::Law;
+use crate::reading::upper_median;
 use nalgebra::SVector;
 use rand::RngExt;
 use rand_pcg::Pcg64;
@@ -75,8 +76,7 @@ impl Space {
     pub(super) fn new(slope: SlopePrior, record: &RateRecord) -> Self {
         let length = record.from[0];
         let mut spacings: Vec<f64> = record.to.windows(2).map(|two| two[0] - two[1]).collect();
-        spacings.sort_by(f64::total_cmp);
-        let spacing = spacings.get(spacings.len() / 2).copied();
+        let spacing = upper_median(&mut spacings);
         let shortest = spacing.unwrap_or(length).clamp(1e-6 * length, 0.5 * length);
         Self {
             slope,

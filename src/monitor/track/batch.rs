@@ -1,13 +1,13 @@
 //! Readings that are not judged as they come: of a batch those that were late, of a queue the newest when it ends, and one in an
 //! evacuation time at least where orange is possible.
 
-use super::{Phase, Prepared, StepContext, Track, days};
+use super::{Phase, Prepared, StepContext, Track};
 use crate::alert::{Level, Policy, to_the_next_reading};
 use crate::fit::Observations;
 use crate::forecast::{Indicators, of_motion};
 use crate::monitor::event::Event;
 use crate::monitor::history::{MeasuredAs, Taken};
-use crate::reading::{Reading, Timestamp};
+use crate::reading::{Reading, Timestamp, days_of};
 
 impl Track {
     /// Everything that came together has been taken: judges what of it came late, or queued.
@@ -55,8 +55,8 @@ impl Track {
         }
         Indicators::of(&of_motion(observations)).is_some_and(|shown| {
             let red = to_the_next_reading(policy.red_within(), shown.interval_days());
-            !shown.may_reach(days(red), policy.red_chance)
-                && !shown.may_reach(days(policy.outlook), policy.orange_chance)
+            !shown.may_reach(days_of(red), policy.red_chance)
+                && !shown.may_reach(days_of(policy.outlook), policy.orange_chance)
         })
     }
 

@@ -1,9 +1,8 @@
 //! What one benchmark is forecast to do: by the law without a known load, and by that under the known load beside it.
 
-use super::days;
 use crate::alert::{AlertEvidence, Policy, to_the_next_reading};
 use crate::forecast::{Outlook, Passage};
-use crate::reading::SECONDS_PER_DAY;
+use crate::reading::{SECONDS_PER_DAY, days_of};
 use jiff::SignedDuration;
 
 /// A forecast is the slope's for so many lengths of its record; further ahead it is the prior's, and calls no level.
@@ -33,7 +32,7 @@ impl Forecast {
         let plain = &self.plain;
         let first = plain.rates.first();
         let length = first.map_or(0.0, |rate| plain.now_days - rate.from);
-        if REACH * length >= days(policy.outlook) {
+        if REACH * length >= days_of(policy.outlook) {
             return policy.outlook;
         }
         let reach = SignedDuration::try_from_secs_f64(REACH * length * SECONDS_PER_DAY);
@@ -117,7 +116,7 @@ impl LookAhead {
         forecast: Option<&Forecast>,
         observed: AlertEvidence,
     ) -> AlertEvidence {
-        let within = |span| forecast.map(|forecast| forecast.chance_within(days(span)));
+        let within = |span| forecast.map(|forecast| forecast.chance_within(days_of(span)));
         let chances = policy.spans().filter_map(|span| {
             let forecast = forecast?;
             Some((span, within(forecast.to_the_next_reading(span))?))

@@ -22,11 +22,10 @@ use super::history::{MeasuredAs, Taken};
 use super::kept::KeptForecast;
 use crate::alert::{AlertCause, Level, Policy};
 use crate::fit::Rate;
-use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Suspicion, Timestamp};
+use crate::reading::{BenchmarkId, Reading, Suspicion, Timestamp};
 use alarm::{Alarm, BesideForecast};
 use forecast::Forecast;
 use forecaster::Forecaster;
-use jiff::SignedDuration;
 use pending::Pending;
 use quality::DataQuality;
 use record::BenchmarkRecord;
@@ -208,7 +207,7 @@ impl Track {
         phase: Phase,
     ) -> Vec<Event> {
         let mut events = Vec::new();
-        // A state of an earlier version is gone through again as it was.
+        // A state of an earlier version is judged again as it was.
         if phase.holds_scale {
             self.quality.look_at_unit(&self.record, source.unit);
         }
@@ -239,11 +238,11 @@ impl Track {
         if waits_for_batch {
             self.pending.note_unjudged_late();
         }
-        if context.phase.is_past {
+        // Until all of them have come the record is half as it was and half corrected: what it shows together no slope did.
+        if context.phase.is_past || waits_for_batch {
             return Vec::new();
         }
-        if waits_for_batch
-            || self.quality.is_stuck()
+        if self.quality.is_stuck()
             || !self.is_refit_due(policy, taken, time)
             || context.phase.is_queue && self.waits(policy, newest)
         {
@@ -414,10 +413,6 @@ fn beside<'a>(
         has_effect: forecaster.has_effect(),
         shows_motion: quality.shows_motion(),
     }
-}
-
-fn days(span: SignedDuration) -> f64 {
-    span.as_secs_f64() / SECONDS_PER_DAY
 }
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
-//! A benchmark's past, gone through after its newest reading has been judged: what would have been, had each reading
+//! A benchmark's past, judged after its newest reading has been judged: what would have been, had each reading
 //! been judged as it came.
 
 use super::forecast::{Forecast, LookAhead};
-use super::{StepContext, Track, days};
+use super::{StepContext, Track};
 use crate::alert::{Level, Policy};
 use crate::fit::Observation;
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::{AlertState, Event, EventKind};
-use crate::reading::{BenchmarkId, Reading, Timestamp};
+use crate::reading::{BenchmarkId, Reading, Timestamp, days_of};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +23,7 @@ pub(in crate::monitor) const PAST: &str = "past";
 const JUDGED_A_COURSE: i32 = 12;
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 
-/// A benchmark's past, as far as it has been gone through.
+/// A benchmark's past, as far as it has been judged.
 #[derive(Debug, Serialize, Deserialize)]
 pub(in crate::monitor) struct PastReplay {
     /// As it would stand by now.
@@ -91,7 +91,7 @@ impl Track {
         forecast: &Forecast,
         context: &StepContext<'_>,
     ) {
-        let red_within = days(LookAhead::of(policy, Some(forecast)).red);
+        let red_within = days_of(LookAhead::of(policy, Some(forecast)).red);
         if forecast.chance_within(red_within) < policy.red_mean_chance() / 2.0 {
             return;
         }
@@ -187,7 +187,7 @@ impl Track {
         (events, values.len() - from > MOST_READINGS)
     }
 
-    /// The past has been gone through: goes on as it leads to. A level from there that has not ended is called.
+    /// The past has been judged: goes on as it leads to. A level from there that has not ended is called.
     pub(in crate::monitor) fn go_on_from(
         &mut self,
         policy: &Policy,

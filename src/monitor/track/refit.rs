@@ -1,6 +1,5 @@
 //! What a refit says: the regime, the failure time, and what of both is other than at the refits before.
 
-use super::days;
 use super::forecast::{EARLY, Forecast};
 use super::record::BenchmarkRecord;
 use crate::alert::{AlertCause, Policy};
@@ -12,7 +11,7 @@ use crate::monitor::event::{
 };
 use crate::monitor::motion::settled;
 use crate::monitor::recent;
-use crate::reading::{Timestamp, after_days};
+use crate::reading::{Timestamp, after_days, days_of};
 use crate::regime::{Regime, Tracker, label};
 use serde::Serialize;
 
@@ -61,7 +60,7 @@ impl FitChanges {
         let predicted = PredictedTimes::of(outlook);
         let mut causes = Vec::new();
         let mut events = vec![refit_event(record, policy, time, forecast, predicted)];
-        let in_force = forecast.in_force(days(policy.outlook));
+        let in_force = forecast.in_force(days_of(policy.outlook));
         events.extend(self.flip(record, time, in_force, &mut causes));
         events.extend(surprise(record, time, forecast, &mut causes));
         events.extend(self.drifts(record, time, outlook, predicted, &mut causes));
@@ -187,7 +186,7 @@ fn refit_event(
 ) -> Event {
     let epoch = record.history().epoch;
     let at = |days: Option<f64>| days.and_then(|days| after_days(epoch, days));
-    let outlook = forecast.in_force(days(policy.outlook));
+    let outlook = forecast.in_force(days_of(policy.outlook));
     let plain = forecast.known_load.as_ref().map(|known_load| {
         Box::new(Plain {
             regime: report(&forecast.plain),
@@ -208,8 +207,8 @@ fn refit_event(
         },
         transition_time: at(predicted.transition),
         velocity_mm_per_day: forecast.plain.rates.last().map(|rate| rate.velocity),
-        chance_within_evacuation_time: forecast.chance_within(days(policy.evacuation_time)),
-        chance_within_outlook: forecast.chance_within(days(policy.outlook)),
+        chance_within_evacuation_time: forecast.chance_within(days_of(policy.evacuation_time)),
+        chance_within_outlook: forecast.chance_within(days_of(policy.outlook)),
         called: None,
         plain,
     };

@@ -12,7 +12,18 @@ use crate::runtime::sources::Sources;
 use crate::runtime::tail::Arrival;
 use crate::runtime::view::Facts;
 use crate::store::StoreError;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
+
+/// What stands in the files that ways out for alerts take when they are set up, as one number; a file that cannot be read counts as empty.
+pub(super) fn read_by_hooks(config: &Config) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    let ways_out = config.hooks.iter().filter_map(|hook| hook.to.as_ref());
+    for file in ways_out.flat_map(|to| to.reads()) {
+        std::fs::read(file).unwrap_or_default().hash(&mut hasher);
+    }
+    hasher.finish()
+}
 
 impl Daemon {
     /// Waits for the hooks to finish. Were others notified of the same meanwhile, people would be notified twice.
@@ -30,10 +41,10 @@ impl Daemon {
         }
     }
 
-    /// Whether the hooks of `fresh` are those at work, none of which reads more than its config when it is set up. They go on then: no red
+    /// Whether the hooks of `fresh` are those at work, and the files that they took when they were set up are as they were. They go on then: no red
     /// waits until a hook that runs has ended.
     fn keeps_hooks(&self, fresh: &Config) -> bool {
-        fresh.hooks == self.config.hooks && fresh.hooks.iter().all(|hook| hook.to.is_none())
+        fresh.hooks == self.config.hooks && read_by_hooks(fresh) == self.read_by_hooks
     }
 
     /// The config file as it is now with its token, or why it cannot be taken.
@@ -63,7 +74,7 @@ impl Daemon {
             format!("the config file is not taken, and the one before stays in force: {why}");
         self.show_refusal(&ConfigRefusal {
             refused: Some(why),
-            since: Some((self.wall)()),
+            since: Some((self.host_time)()),
         });
         self.report("config-refused", text)
     }
@@ -85,7 +96,7 @@ impl Daemon {
 
     /// A fault that concerns the whole site, among the events.
     fn report(&mut self, kind: &str, text: String) -> Result<(), StoreError> {
-        let (time, kind) = ((self.wall)(), kind.to_owned());
+        let (time, kind) = ((self.host_time)(), kind.to_owned());
         let input = Input::Trouble { kind, text };
         let events = self.site.take(&Arrival { time, input }, time)?;
         self.pulse.vitals.note(&events);
@@ -152,6 +163,7 @@ impl Daemon {
         let has_lost_hooks = fresh.hooks.is_empty() && !self.config.hooks.is_empty();
         let were_fileless = sources_without_files(&self.config);
         (self.files_are_read, self.is_up_to_date) = (false, false);
+        self.read_by_hooks = read_by_hooks(&fresh);
         self.config = fresh;
         self.pulse.service.ready("watching");
         tracing::info!(file = %self.config.file.display(), "the config is taken");

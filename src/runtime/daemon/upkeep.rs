@@ -88,7 +88,7 @@ impl Daemon {
         if let Err(error) = self.store.verify(&mut self.verified)
             && !is_damaged
         {
-            tracing::error!(%error, "the state on the disk has changed by itself");
+            tracing::error!(%error, "the state on the disk is damaged");
             self.pulse
                 .vitals
                 .update(|health| health.is_store_damaged = true);

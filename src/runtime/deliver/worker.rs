@@ -1,4 +1,4 @@
-//! The worker of one hook: what is due, in the order of its gravity, a few at once.
+//! The worker of one hook: what is due, in the order of its severity, a few at once.
 
 use super::{QUEUE, Retry, Runner, locked};
 use crate::alert::Level;
@@ -28,7 +28,7 @@ const LOOK_AGAIN_MUTED: Duration = Duration::from_secs(1);
 /// Runs of one hook at a time, each for another benchmark.
 const MOST_AT_ONCE: usize = 4;
 /// So many more of red and orange: runs for less that hang keep none of them waiting.
-const MORE_OF_THE_GRAVE: usize = 2;
+const MORE_OF_SEVERE: usize = 2;
 /// A run that lasts longer than this does not keep a graver alert of its own benchmark waiting either, and is broken off for it; the run of an end does.
 const KEEPS_WAITING: Duration = Duration::from_secs(10);
 
@@ -46,7 +46,7 @@ struct Waiting {
 }
 
 /// How grave it is: of two that are due the higher goes first.
-fn gravity(alert: &Alert) -> u8 {
+fn severity(alert: &Alert) -> u8 {
     match (alert.level, alert.state) {
         (Level::Red, MessageState::Firing) => 5,
         (Level::Orange, MessageState::Firing) => 4,
@@ -61,8 +61,8 @@ fn gravity(alert: &Alert) -> u8 {
 }
 
 /// Whether people may have to leave their houses.
-fn is_grave(alert: &Alert) -> bool {
-    gravity(alert) >= 4
+fn is_severe(alert: &Alert) -> bool {
+    severity(alert) >= 4
 }
 
 /// What is reported by one run at a time, so that its order stays.
@@ -179,8 +179,8 @@ impl Worker {
 
     /// From when on it may be started, at `due` or later; `None` before another run has ended.
     fn free_from(&self, due: Instant, waiting: &Waiting) -> Option<Instant> {
-        let is_grave = is_grave(&waiting.alert);
-        let more = if is_grave { MORE_OF_THE_GRAVE } else { 0 };
+        let is_severe = is_severe(&waiting.alert);
+        let more = if is_severe { MORE_OF_SEVERE } else { 0 };
         if self.running.len() >= MOST_AT_ONCE + more {
             return None;
         }
@@ -190,8 +190,8 @@ impl Worker {
             .filter(|run| place(&run.waiting.alert) == place(&waiting.alert));
         at_its_place.try_fold(due, |from, run| {
             let of_less = run.waiting.alert.state == MessageState::Firing
-                && gravity(&waiting.alert) > gravity(&run.waiting.alert);
-            (is_grave && of_less).then(|| from.max(run.started + KEEPS_WAITING))
+                && severity(&waiting.alert) > severity(&run.waiting.alert);
+            (is_severe && of_less).then(|| from.max(run.started + KEEPS_WAITING))
         })
     }
 
@@ -209,7 +209,7 @@ impl Worker {
         };
         let free = due.iter().filter(is_free);
         let next = free.max_by_key(|((due, number), waiting)| {
-            (gravity(&waiting.alert), std::cmp::Reverse((*due, *number)))
+            (severity(&waiting.alert), std::cmp::Reverse((*due, *number)))
         });
         let Some(turn) = next.map(|(turn, waiting)| end_before(turn, waiting, &due)) else {
             return false;
@@ -327,7 +327,7 @@ impl Worker {
                 tracing::error!(hook, key, attempt, ?outcome, "alert not delivered");
                 DeliveryOutcome::Dead
             } else {
-                let text = "alert not delivered yet: this stops, and the next start tries again";
+                let text = "alert not delivered yet: it is sent again after the next start";
                 tracing::warn!(hook, key, attempt, ?outcome, "{text}");
                 DeliveryOutcome::Waiting
             };
@@ -376,7 +376,11 @@ impl Worker {
         let (hook, key) = (self.hook.name(), &alert.key);
         let is_called_off = locked(&self.delivered).is_called_off(alert, &hook);
         if is_called_off {
-            tracing::info!(hook, key, "not tried again: people see to it");
+            tracing::info!(
+                hook,
+                key,
+                "not sent again: the alert is acknowledged or silenced"
+            );
         } else {
             tracing::error!(hook, key, "alert not delivered before it was over");
             self.lost += 1;

@@ -2,6 +2,7 @@
 
 use super::{CheckVerdict, Finding};
 use crate::config::{Config, RecordFiles};
+use crate::reading::upper_median_by;
 use crate::runtime::clock::Stopwatch;
 use nix::sys::statfs::statfs;
 use nix::sys::statvfs::statvfs;
@@ -150,8 +151,7 @@ pub(super) fn fsync(folder: &Path) -> Finding {
             format!("nothing can be written to {place}: {error}"),
         ),
         Ok(mut times) => {
-            times.sort();
-            let median = times[times.len() / 2];
+            let median = upper_median_by(&mut times, Ord::cmp).unwrap_or_default();
             let milliseconds = median.as_secs_f64() * 1e3;
             let text = format!("median of {SYNCS} in {place}: {milliseconds:.2} ms");
             if median > SLOW {

@@ -2,7 +2,7 @@
 
 use super::{CheckVerdict, Finding};
 use crate::config::{Config, HookConfig};
-use crate::runtime::sandbox::{self, Walls};
+use crate::runtime::sandbox::{self, WriteLimits};
 use crate::runtime::ways_out::WAYS_OUT;
 
 /// Whether an attempt could be made.
@@ -34,20 +34,20 @@ pub fn unstartable(config: &Config) -> Vec<String> {
         .collect()
 }
 
-/// Whether the kernel would hold the walls, where a hook is to have some.
-pub(super) fn walls(hooks: &[HookConfig]) -> Option<Finding> {
+/// Whether the kernel would limit where hooks write, where one is to be limited.
+pub(super) fn write_limits(hooks: &[HookConfig]) -> Option<Finding> {
     let is_needed = hooks.iter().any(|hook| hook.sandbox);
     let finding = |verdict, text: &str| Finding::new("sandbox", verdict, text);
     is_needed.then(|| match sandbox::probe() {
-        Walls::Whole => finding(
+        WriteLimits::Full => finding(
             CheckVerdict::Good,
             "hooks can write only where they are allowed to",
         ),
-        Walls::Partial => finding(
+        WriteLimits::Partial => finding(
             CheckVerdict::Doubtful,
             "an old kernel keeps hooks from most writes elsewhere, not from all",
         ),
-        Walls::Missing => finding(
+        WriteLimits::Unsupported => finding(
             CheckVerdict::Doubtful,
             "the kernel has no landlock: hooks can write wherever the daemon can",
         ),

@@ -69,7 +69,7 @@ pub fn examine(config: &Config) -> Vec<Finding> {
     findings.extend(config.site.record.iter().map(disk::record));
     findings.push(clock_sync::finding());
     findings.extend(config.hooks.iter().map(hooks::finding));
-    findings.extend(hooks::walls(&config.hooks));
+    findings.extend(hooks::write_limits(&config.hooks));
     findings.extend(feeds::findings(config));
     findings.extend(recordings::findings(&config.sources));
     findings

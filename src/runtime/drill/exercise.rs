@@ -54,17 +54,17 @@ struct Exercise {
 /// # Errors
 /// Why it failed, one line for people.
 pub(super) async fn hold(
-    office: &DrillContext,
+    context: &DrillContext,
     drill: &Drill,
     shutdown: &Shutdown,
 ) -> Result<PassedDrill, String> {
     let started = clock::now();
-    let file = made(office, started).map_err(|error| format!("its folder: {error}"))?;
-    let hooks = hooks(&office.config);
-    let mut exercise = Exercise::start(office, &hooks, shutdown)
+    let file = made(context, started).map_err(|error| format!("its folder: {error}"))?;
+    let hooks = hooks(&context.config);
+    let mut exercise = Exercise::start(context, &hooks, shutdown)
         .map_err(|error| format!("it could not be started: {error}"))?;
     let held = exercise
-        .held(&file, started, hooks.len(), office, drill)
+        .held(&file, started, hooks.len(), context, drill)
         .await;
     exercise.end(hooks.len()).await;
     held
@@ -85,8 +85,8 @@ fn hooks(config: &Config) -> Vec<HookConfig> {
 }
 
 /// The folder, without what the last drill left, and the file with the past in it.
-fn made(office: &DrillContext, started: Timestamp) -> io::Result<PathBuf> {
-    let folder = run_folder(office);
+fn made(context: &DrillContext, started: Timestamp) -> io::Result<PathBuf> {
+    let folder = run_folder(context);
     if folder.exists() {
         fs::remove_dir_all(&folder)?;
     }
@@ -97,8 +97,8 @@ fn made(office: &DrillContext, started: Timestamp) -> io::Result<PathBuf> {
     Ok(file)
 }
 
-fn run_folder(office: &DrillContext) -> PathBuf {
-    folder(&office.config.site.state_dir).join("run")
+fn run_folder(context: &DrillContext) -> PathBuf {
+    folder(&context.config.site.state_dir).join("run")
 }
 
 /// Readings of a slope that fails, the last of all now: 1/v falls on a straight line.
@@ -124,11 +124,11 @@ fn append(file: &Path, text: &str) -> io::Result<()> {
 
 impl Exercise {
     fn start(
-        office: &DrillContext,
+        context: &DrillContext,
         hooks: &[HookConfig],
         shutdown: &Shutdown,
     ) -> anyhow::Result<Self> {
-        let folder = run_folder(office);
+        let folder = run_folder(context);
         let text = format!(
             "[site]\nname = \"drill\"\nstate_dir = \"state\"\n\
              [[source]]\nid = \"{EXERCISE}\"\nkind = \"csv\"\npath = \"{EXERCISE}.csv\"\n\
@@ -150,7 +150,7 @@ impl Exercise {
             )),
             status: Status::Exercise,
         };
-        let name = &office.config.site.name;
+        let name = &context.config.site.name;
         let site = Site::resume(name, config.settings.clone(), sinks, &mut || {})?;
         let pulse = Reporting::inward();
         let sources = Sources::start(&config, &store, pulse.vitals.faults())?;
@@ -168,7 +168,7 @@ impl Exercise {
         file: &Path,
         started: Timestamp,
         hooks: usize,
-        office: &DrillContext,
+        context: &DrillContext,
         drill: &Drill,
     ) -> Result<PassedDrill, String> {
         self.until(LIMIT, "its past was not read", |daemon, _| {
@@ -194,7 +194,7 @@ impl Exercise {
         reached.map_err(|why| self.explained(&why))?;
         let latency = self.watched.seen().latency.unwrap_or_default();
         let acknowledged = match drill.acknowledge_within {
-            Some(within) => Some(self.acknowledged(office, started, within).await?),
+            Some(within) => Some(self.acknowledged(context, started, within).await?),
             None => None,
         };
         Ok(PassedDrill {
@@ -240,7 +240,7 @@ impl Exercise {
     /// Waits for somebody to acknowledge it: the order stands in the site's own log, whatever way it came by.
     async fn acknowledged(
         &mut self,
-        office: &DrillContext,
+        context: &DrillContext,
         started: Timestamp,
         within: SignedDuration,
     ) -> Result<Duration, String> {
@@ -248,7 +248,7 @@ impl Exercise {
         let within = within.unsigned_abs();
         loop {
             let found =
-                acknowledgement(&office.store, started).map_err(|error| error.to_string())?;
+                acknowledgement(&context.store, started).map_err(|error| error.to_string())?;
             if let Some(given) = found {
                 let order = Order::Acknowledge {
                     benchmark: Some(BenchmarkId::new(EXERCISE)),

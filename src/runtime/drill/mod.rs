@@ -50,7 +50,7 @@ pub(super) fn start(
     let shown = held.as_ref().map(|(_, record)| record.clone());
     vitals.update(|health| health.drill = shown);
     if let Some((drill, record)) = held {
-        let office = DrillContext {
+        let context = DrillContext {
             config: config.clone(),
             store: Arc::clone(store),
             vitals: Arc::clone(vitals),
@@ -60,7 +60,7 @@ pub(super) fn start(
             let mut asked = shutdown.clone();
             tokio::select! {
                 () = asked.requested() => {}
-                () = hold(&office, &drill, record, &mut shutdown) => {}
+                () = hold(&context, &drill, record, &mut shutdown) => {}
             }
         });
     }
@@ -68,23 +68,23 @@ pub(super) fn start(
 }
 
 async fn hold(
-    office: &DrillContext,
+    context: &DrillContext,
     drill: &Drill,
     mut record: DrillRecord,
     shutdown: &mut Shutdown,
 ) {
-    let site = &office.config.site;
+    let site = &context.config.site;
     loop {
         record.overdue_after = overdue_after(drill, &record);
-        keep(office, &record);
+        keep(context, &record);
         let due = due(drill, &record, clock::now(), &site.time_zone);
         // Before the past has been read nobody is watched, and the machine has other work.
-        while clock::now() < due || !office.vitals.health().is_caught_up {
+        while clock::now() < due || !context.vitals.health().is_caught_up {
             tokio::time::sleep(POLL_INTERVAL).await;
         }
         tracing::info!("a drill begins");
         record.started = Some(clock::now());
-        match Box::pin(exercise::hold(office, drill, shutdown)).await {
+        match Box::pin(exercise::hold(context, drill, shutdown)).await {
             Ok(passed) => record.passes(passed, clock::now()),
             Err(why) => {
                 tracing::error!(why, "the drill failed: an alert might not arrive either");
@@ -95,12 +95,12 @@ async fn hold(
 }
 
 /// Shows how drills stand, and keeps it over restarts.
-fn keep(office: &DrillContext, record: &DrillRecord) {
-    if let Err(error) = record.write(&office.config.site.state_dir) {
+fn keep(context: &DrillContext, record: &DrillRecord) {
+    if let Err(error) = record.write(&context.config.site.state_dir) {
         tracing::warn!(%error, "a restart will not know of the last drill");
     }
     let shown = Some(record.clone());
-    office.vitals.update(|health| health.drill = shown);
+    context.vitals.update(|health| health.drill = shown);
 }
 
 /// When the next one begins.

@@ -15,6 +15,8 @@ pub(super) struct Collector {
 /// A value in another unit, or of another averaging, than those before it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Inconsistent {
+    /// The field of it.
+    pub(super) field: &'static str,
     pub(super) found: String,
     pub(super) expected: &'static str,
 }
@@ -42,6 +44,7 @@ impl Collector {
                 }
                 if series.averaging != averaging {
                     return Err(Inconsistent {
+                        field: super::message::AVERAGING,
                         found: averaging.map_or("none".to_owned(), |span| span.to_string()),
                         expected: "the same averaging as in the first value",
                     });
@@ -86,6 +89,7 @@ impl Collector {
 
 fn one_unit(found: String) -> Inconsistent {
     Inconsistent {
+        field: "unit",
         found,
         expected: "the same unit as in the first value",
     }

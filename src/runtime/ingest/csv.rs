@@ -6,10 +6,11 @@
 
 use super::again::HeaderReadings;
 use super::columns::{Layout, Meaning};
+use super::remark::Remark;
 use super::split::Splitter;
 use super::table::TableRows;
 use super::table_write::write_csv;
-use super::taken::{LineResult, Remark};
+use super::taken::LineResult;
 use super::text_format::{LineReader, TextFormat};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{Delimiter, Dialect};

@@ -8,8 +8,9 @@
 use super::bytes::{is_stdin, stdin};
 use super::collect::Collector;
 use super::mcap_stream::{GROWING, PROVENANCE};
-use super::message::{MessageError, Topic, decode_message, is_said};
-use super::taken::{BadRows, Remark};
+use super::message::{MessageChannel, MessageError, Topic, decode_message, is_said};
+use super::remark::Remark;
+use super::taken::BadRows;
 use super::{IngestError, Item, MCAP_MAGIC as MAGIC, ReadOptions};
 use crate::reading::{Disorder, Recording, Timestamp};
 use ::mcap::McapError;
@@ -153,7 +154,12 @@ impl<'a> Contents<'a> {
                     let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
                     return Err(self.damaged(unknown));
                 };
-                match decode_checked(channel, header.publish_time, &data) {
+                let of = MessageChannel {
+                    topic: &channel.topic,
+                    metadata: &channel.metadata,
+                    encoding: &channel.message_encoding,
+                };
+                match decode_message(of, header.publish_time, &data) {
                     Ok(None) => {}
                     Ok(Some(item)) => {
                         if let Err(fault) = self.collect(&channel.topic.clone(), item) {
@@ -174,7 +180,6 @@ impl<'a> Contents<'a> {
     }
 
     fn collect(&mut self, topic: &str, mut item: Item) -> Result<(), IngestError> {
-        let mut field = "unit";
         if let Item::Reading {
             unit, averaging, ..
         } = &mut item
@@ -184,12 +189,9 @@ impl<'a> Contents<'a> {
         self.taken += 1;
         self.newest = Some(item.time());
         self.collected.add(item).map_err(|odd| {
-            if odd.expected.contains("averaging") {
-                field = super::message::AVERAGING;
-            }
             self.message(MessageError {
                 topic: topic.to_owned(),
-                field,
+                field: odd.field,
                 value: format!("{:?}", odd.found),
                 expected: odd.expected,
             })
@@ -245,20 +247,4 @@ impl<'a> Contents<'a> {
             ),
         ))
     }
-}
-
-fn decode_checked(
-    channel: &Channel,
-    publish_time: u64,
-    payload: &[u8],
-) -> Result<Option<Item>, MessageError> {
-    if channel.message_encoding != "json" && Topic::parse(&channel.topic).is_some() {
-        return Err(MessageError {
-            topic: channel.topic.clone(),
-            field: "message_encoding",
-            value: format!("{:?}", channel.message_encoding),
-            expected: "json",
-        });
-    }
-    decode_message(&channel.topic, &channel.metadata, publish_time, payload)
 }

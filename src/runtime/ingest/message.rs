@@ -127,20 +127,45 @@ pub(super) struct Payload<'a> {
     pub(super) sigma: Option<f64>,
 }
 
-/// Decodes one message; `None` if its topic is not one of ours. `metadata` is that of its MCAP
-/// channel, `publish_time` its own in nanoseconds.
+/// How the messages that are read are encoded.
+pub const JSON: &str = "json";
+
+/// What an MCAP file says of the channel of a message.
+#[derive(Debug, Clone, Copy)]
+pub struct MessageChannel<'a> {
+    /// Its topic.
+    pub topic: &'a str,
+    /// Its metadata.
+    pub metadata: &'a BTreeMap<String, String>,
+    /// How its messages are encoded.
+    pub encoding: &'a str,
+}
+
+/// Decodes one message; `None` if its topic is not one of ours. `publish_time` is its own, in nanoseconds.
 ///
 /// # Errors
 /// [`MessageError`] names the field that is wrong.
 pub fn decode_message(
-    topic: &str,
-    metadata: &BTreeMap<String, String>,
+    channel: MessageChannel<'_>,
     publish_time: u64,
     payload: &[u8],
 ) -> Result<Option<Item>, MessageError> {
+    let MessageChannel {
+        topic,
+        metadata,
+        encoding,
+    } = channel;
     let Some(meant) = Topic::parse(topic) else {
         return Ok(None);
     };
+    if encoding != JSON {
+        return Err(MessageError {
+            topic: topic.to_owned(),
+            field: "message_encoding",
+            value: format!("{encoding:?}"),
+            expected: JSON,
+        });
+    }
     let message: Value = serde_json::from_slice(payload).unwrap_or(Value::Null);
     let Value::Object(message) = message else {
         return Err(MessageError {
@@ -322,13 +347,32 @@ impl<'a> Fields<'a> {
 mod tests {
     use super::*;
 
+    fn of<'a>(topic: &'a str, metadata: &'a BTreeMap<String, String>) -> MessageChannel<'a> {
+        MessageChannel {
+            topic,
+            metadata,
+            encoding: JSON,
+        }
+    }
+
     fn decode(payload: &str) -> Result<Option<Item>, MessageError> {
-        decode_message(
-            "/benchmarks/a/displacement",
-            &BTreeMap::new(),
-            1_000_000_000,
-            payload.as_bytes(),
-        )
+        let none = BTreeMap::new();
+        let channel = of("/benchmarks/a/displacement", &none);
+        decode_message(channel, 1_000_000_000, payload.as_bytes())
+    }
+
+    #[test]
+    fn messages_that_are_not_json_are_refused_by_their_encoding() {
+        let (none, payload) = (BTreeMap::new(), br#"{"value": 1, "unit": "mm"}"#);
+        let channel = MessageChannel {
+            encoding: "cdr",
+            ..of("/benchmarks/a/displacement", &none)
+        };
+        let refused = decode_message(channel, 1, payload).unwrap_err();
+        assert_eq!(
+            (refused.field, refused.expected),
+            ("message_encoding", "json")
+        );
     }
 
     #[test]
@@ -359,7 +403,10 @@ mod tests {
     #[test]
     fn another_topic_is_none_of_ours() {
         for topic in ["/tf", "/benchmarks/a", "/benchmarks/a/tilt", "/channels/"] {
-            assert_eq!(decode_message(topic, &BTreeMap::new(), 1, b"{}"), Ok(None));
+            assert_eq!(
+                decode_message(of(topic, &BTreeMap::new()), 1, b"{}"),
+                Ok(None)
+            );
         }
     }
 
@@ -380,7 +427,7 @@ mod tests {
         let decode = |key: &str, text: &str| {
             let metadata = [(key.to_owned(), text.to_owned())].into();
             let json = br#"{"value": 1, "unit": "mm/h"}"#;
-            decode_message("/benchmarks/a/velocity", &metadata, 1_500_000_000, json)
+            decode_message(of("/benchmarks/a/velocity", &metadata), 1_500_000_000, json)
         };
         let since = "seconds since 1963-08-02T00:00:00Z";
         let Ok(Some(Item::Reading { reading, .. })) = decode(TIME_BASE, since) else {

@@ -11,8 +11,9 @@
 use super::columns::{Layout, Meaning};
 use super::message::{AVERAGING, Fields, MessageError, Topic};
 use super::ndjson_write::write_ndjson;
+use super::remark::Remark;
 use super::table::TableRows;
-use super::taken::{LineResult, Remark};
+use super::taken::LineResult;
 use super::text_format::{LineReader, TextFormat};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, MissingValues, Quantity, Unit};

@@ -1,5 +1,6 @@
 //! What came of one line of a text file.
 
+use super::remark::Remark;
 use super::{IngestError, Item};
 use std::fmt;
 
@@ -47,17 +48,6 @@ impl fmt::Debug for BadRows<'_> {
             "Refuse"
         })
     }
-}
-
-/// Something that a person should know of a file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Remark {
-    /// The column, or what else it is about; one remark about each is enough.
-    pub about: String,
-    /// What there is to know.
-    pub text: String,
-    /// Whether readings are missing by it.
-    pub is_loss: bool,
 }
 
 impl From<Result<Vec<Item>, IngestError>> for LineResult {

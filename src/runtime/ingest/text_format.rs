@@ -1,7 +1,8 @@
 //! What a format of text files is: what the rest of the program asks of it.
 
 use super::columns::Meaning;
-use super::taken::{LineResult, Remark};
+use super::remark::Remark;
+use super::taken::LineResult;
 use super::{IngestError, ReadOptions};
 use crate::reading::Recording;
 use std::collections::BTreeMap;

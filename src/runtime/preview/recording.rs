@@ -91,13 +91,7 @@ fn each_of(
         Ok(message) => message,
         Err(error) => return each(Err(RefusedRow::of_text(named(file, &error)))),
     };
-    let RawMessage {
-        topic,
-        metadata,
-        publish_time,
-        payload,
-    } = &message;
-    match decode_message(topic, metadata, *publish_time, payload) {
+    match decode_message(message.channel(), message.publish_time, &message.payload) {
         Ok(item) => item.is_none_or(|item| each(Ok(item))),
         Err(error) => each(Err(RefusedRow::of_message(&error, named(file, &error)))),
     }

@@ -3,7 +3,9 @@
 use super::resets::DeclaredResets;
 use super::view::BenchmarkPreview;
 use crate::reading::other_unit::{self, OtherUnit};
-use crate::reading::{LocalClock, Quantity, SummerTime, Suspicion, Timestamp, Unit, suspicion};
+use crate::reading::{
+    LocalClock, Quantity, SummerTime, Suspicion, Timestamp, Unit, suspicion, upper_median_by,
+};
 use jiff::tz::TimeZone;
 use std::collections::BTreeSet;
 
@@ -170,8 +172,7 @@ impl PreviewTrack {
             .collect();
         let pairs = latest.iter().zip(latest.iter().skip(1));
         let mut gaps: Vec<i64> = pairs.map(|(b, a)| b.duration_since(*a).as_secs()).collect();
-        gaps.sort_unstable();
-        self.view.every_s = gaps.get(gaps.len() / 2).copied();
+        self.view.every_s = upper_median_by(&mut gaps, Ord::cmp);
         let (values, of_resets) = self.without_resets();
         self.view.moved_mm = self.moved_mm(&values);
         self.view.suspicions = self.suspicions(newest, now, &values, of_resets);

@@ -16,7 +16,7 @@ pub(super) type LevelAndUnknown = (Level, bool);
 #[derive(Debug, Default)]
 pub(super) struct LevelsNow {
     in_force: BTreeMap<Place, (LevelAndUnknown, Timestamp)>,
-    /// After a first start the past is gone through when the present has been judged; it changes nothing of that.
+    /// After a first start the past is judged when the present has been judged; it changes nothing of that.
     past: BTreeMap<Place, LevelAndUnknown>,
 }
 

@@ -125,7 +125,7 @@ impl LiveRecord {
     pub(in crate::runtime) async fn close(self, limit: Duration) {
         let _ = self.orders.send(RecordOrder::Stop);
         if tokio::time::timeout(limit, self.done).await.is_err() {
-            tracing::warn!("the record is not ended: its disk does not answer");
+            tracing::warn!("the recording could not be closed: its disk does not respond");
         }
     }
 }

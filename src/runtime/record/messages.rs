@@ -144,7 +144,7 @@ pub(super) fn log(event: &Event, words: &str) -> Option<Value> {
     if matches!(event.kind, EventKind::Refit { .. } | EventKind::Summary(_)) {
         return None;
     }
-    let gravity = if let EventKind::Alert { level, .. } = &event.kind {
+    let severity = if let EventKind::Alert { level, .. } = &event.kind {
         match level {
             Level::Green => schemas::INFO,
             Level::Yellow | Level::Unknown => schemas::WARNING,
@@ -163,7 +163,7 @@ pub(super) fn log(event: &Event, words: &str) -> Option<Value> {
             "sec": i64::try_from(nanosecond.div_euclid(1_000_000_000)).unwrap_or_default(),
             "nsec": u32::try_from(nanosecond.rem_euclid(1_000_000_000)).unwrap_or_default(),
         },
-        "level": gravity,
+        "level": severity,
         "message": words,
         "name": of,
         "file": event.kind.name(),

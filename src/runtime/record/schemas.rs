@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-/// Foxglove's gravities of a message.
+/// Foxglove's levels of a message.
 pub(super) const INFO: u8 = 2;
 pub(super) const WARNING: u8 = 3;
 pub(super) const ERROR: u8 = 4;
@@ -71,12 +71,12 @@ const CHANCES: [Field; 5] = [
     (
         "chance_within_evacuation_time",
         "number",
-        "Chance of collapse within the evacuation time, as levels go by it",
+        "Chance of collapse within the evacuation time, as levels use it",
     ),
     (
         "chance_within_outlook",
         "number",
-        "Chance of collapse within the outlook, as levels go by it",
+        "Chance of collapse within the outlook, as levels use it",
     ),
     (
         "chance_within_2_days",
@@ -168,9 +168,9 @@ fn object(
 
 /// Foxglove's own, by its published definition (foxglove-sdk, schemas/jsonschema/Log.json).
 pub(super) fn log() -> Schema {
-    let gravity = |(number, title): (usize, &&str)| json!({ "title": title, "const": number });
-    let gravities = ["UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"];
-    let gravities: Vec<Value> = gravities.iter().enumerate().map(gravity).collect();
+    let level = |(number, title): (usize, &&str)| json!({ "title": title, "const": number });
+    let levels = ["UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"];
+    let levels: Vec<Value> = levels.iter().enumerate().map(level).collect();
     let schema = json!({
         "title": "foxglove.Log",
         "description": "A log message",
@@ -185,7 +185,7 @@ pub(super) fn log() -> Schema {
                 },
                 "description": "Timestamp of log message",
             },
-            "level": { "title": "foxglove.LogLevel", "description": "Log level", "oneOf": gravities },
+            "level": { "title": "foxglove.LogLevel", "description": "Log level", "oneOf": levels },
             "message": { "type": "string", "description": "Log message" },
             "name": { "type": "string", "description": "The benchmark, or site" },
             "file": { "type": "string", "description": "The kind of event" },

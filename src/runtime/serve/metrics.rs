@@ -1,7 +1,7 @@
 //! The metrics, as OpenMetrics 1.0 text. Names are part of the interface: `deploy/` queries them.
 
 use crate::alert::Level;
-use crate::reading::{BenchmarkId, Timestamp, plain};
+use crate::reading::{BenchmarkId, plain, unix_seconds};
 use crate::runtime::clock;
 use crate::runtime::drilled::DrillRecord;
 use crate::runtime::service_faults::{ServiceFaultKind, ServiceFaults};
@@ -98,7 +98,11 @@ fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
     }
     if let Some(until) = health.silences.iter().map(|mute| mute.until).max() {
         let about = "When the last order ends by which alerts are not reported, Unix time";
-        sheet.gauge("silenced_until_timestamp_seconds", about, seconds(until))?;
+        sheet.gauge(
+            "silenced_until_timestamp_seconds",
+            about,
+            unix_seconds(until),
+        )?;
     }
     Ok(())
 }
@@ -198,7 +202,7 @@ fn state(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
     }
     if let Some(time) = health.outbox_oldest {
         let about = "When the oldest alert that waits was called, data time, Unix time";
-        sheet.gauge("outbox_oldest_timestamp_seconds", about, seconds(time))?;
+        sheet.gauge("outbox_oldest_timestamp_seconds", about, unix_seconds(time))?;
     }
     if let Some(bytes) = health.database_bytes {
         sheet.gauge("database_bytes", "Size of the database", bytes as f64)?;
@@ -260,7 +264,7 @@ fn benchmarks(sheet: &mut Sheet<'_>, points: &[(BenchmarkId, VitalsPoint)]) -> f
         (
             "last_reading_timestamp_seconds",
             "When the newest reading was measured, Unix time",
-            |point| point.newest.map(seconds),
+            |point| point.newest.map(unix_seconds),
         ),
         (
             "level",
@@ -304,10 +308,6 @@ fn rank(level: Level) -> f64 {
         Level::Orange => 2.0,
         Level::Red => 3.0,
     }
-}
-
-fn seconds(time: Timestamp) -> f64 {
-    time.as_millisecond() as f64 / 1e3
 }
 
 /// The format has a way to write a line break, which stays; of other control characters it knows nothing.

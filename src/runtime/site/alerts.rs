@@ -15,7 +15,7 @@ use jiff::SignedDuration;
 
 impl Site {
     /// Makes everything since the last commit durable in one transaction, then hands the alerts to the hooks, but
-    /// for what began longer before `wall` than twice the evacuation time: of that, [`Site::caught_up`] sends what
+    /// for what began longer before `host_time` than twice the evacuation time: of that, [`Site::caught_up`] sends what
     /// is still in force. Of the end of what they were notified of they are notified however long ago it was.
     ///
     /// On a full disk everything waits for the next commit, and the hooks are notified all the same: an alert may then
@@ -23,8 +23,8 @@ impl Site {
     ///
     /// # Errors
     /// When it cannot be made durable for another reason; the alerts have gone out all the same.
-    pub fn commit(&mut self, wall: Timestamp) -> Result<(), StoreError> {
-        let now = self.keeper.now(wall);
+    pub fn commit(&mut self, host_time: Timestamp) -> Result<(), StoreError> {
+        let now = self.keeper.now(host_time);
         let mut to_send = Vec::new();
         for mut alert in std::mem::take(&mut self.fresh) {
             let age = now.duration_since(alert.event.time);
@@ -38,7 +38,7 @@ impl Site {
                 age <= self.freshness(alert.event.benchmark.as_ref()) || self.never_read(&alert);
             let is_waited_for = self.standing.is_waited_for(&alert);
             let is_due = is_fresh && !self.standing.ends_unreported(&alert) || is_waited_for;
-            let is_muted = self.mutes.are_of(&alert, wall);
+            let is_muted = self.mutes.are_of(&alert, host_time);
             let is_sent = is_due && !is_muted;
             if alert.is_correction() {
                 to_send.extend(is_sent.then_some(alert));
@@ -59,13 +59,13 @@ impl Site {
             self.standing.stand(alert, is_sent);
         }
         for end in self.ended_floods(now) {
-            if self.mutes.are_of(&end, wall) {
+            if self.mutes.are_of(&end, host_time) {
                 self.mutes.put_off(&end);
             } else {
                 to_send.push(end);
             }
         }
-        self.mute_what_is_in_hand(wall);
+        self.mute_what_is_in_hand(host_time);
         self.record_and_send(&to_send)
     }
 
@@ -203,13 +203,13 @@ impl Site {
     ///
     /// # Errors
     /// As [`Site::commit`].
-    pub fn caught_up(&mut self, wall: Timestamp) -> Result<Vec<Event>, StoreError> {
-        let events = self.rest(wall);
+    pub fn caught_up(&mut self, host_time: Timestamp) -> Result<Vec<Event>, StoreError> {
+        let events = self.rest(host_time);
         if !events.is_empty() {
-            self.commit(wall)?;
+            self.commit(host_time)?;
         }
-        let now = self.keeper.now(wall);
-        let mut to_send = self.mutes.no_longer_put_off(wall);
+        let now = self.keeper.now(host_time);
+        let mut to_send = self.mutes.no_longer_put_off(host_time);
         let mut standing = std::mem::take(&mut self.standing);
         for one in standing.all_mut() {
             if one.is_sent {
@@ -217,7 +217,7 @@ impl Site {
                 // Nor does one that was reported together go singly to those who received that.
                 if one.alert.must_arrive()
                     && one.attention == Attention::Awaited
-                    && !self.mutes.are_of(&one.alert, wall)
+                    && !self.mutes.are_of(&one.alert, host_time)
                 {
                     let together = one.is_reported_together;
                     self.send_where(&one.alert, false, &|hook| {
@@ -226,7 +226,7 @@ impl Site {
                 }
             } else if (self.never_read(&one.alert)
                 || self.is_watched(one.alert.event.benchmark.as_ref(), now))
-                && !self.mutes.are_of(&one.alert, wall)
+                && !self.mutes.are_of(&one.alert, host_time)
             {
                 if one.alert.event.time <= BEFORE_ALL {
                     one.alert.event.time = now;
@@ -238,7 +238,7 @@ impl Site {
             }
         }
         self.standing = standing;
-        self.offer_floods_again(wall);
+        self.offer_floods_again(host_time);
         if !to_send.is_empty() {
             self.record_and_send(&to_send)?;
         }
@@ -246,15 +246,15 @@ impl Site {
     }
 
     /// Whether something has been called that people are to be notified of at once.
-    pub fn is_urgent(&self, wall: Timestamp) -> bool {
-        let now = self.keeper.now(wall);
+    pub fn is_urgent(&self, host_time: Timestamp) -> bool {
+        let now = self.keeper.now(host_time);
         self.fresh.iter().any(|alert| {
             let age = now.duration_since(alert.event.time);
             alert.must_arrive() && age <= self.freshness(alert.event.benchmark.as_ref())
         })
     }
 
-    fn is_watched(&self, benchmark: Option<&BenchmarkId>, wall: Timestamp) -> bool {
+    fn is_watched(&self, benchmark: Option<&BenchmarkId>, host_time: Timestamp) -> bool {
         let newest = match benchmark {
             Some(benchmark) => self.read.newest(benchmark),
             None => self.read.newest_of_all(),
@@ -262,7 +262,7 @@ impl Site {
         let limit = (self.freshness(benchmark))
             .max(self.policy(benchmark).outlook)
             .max(LEAST_WATCHED);
-        newest.is_some_and(|newest| wall.duration_since(newest) <= limit)
+        newest.is_some_and(|newest| host_time.duration_since(newest) <= limit)
     }
 
     /// Offers it to those of the hooks that are `meant`; they wait with it while it `is_muted`.

@@ -47,21 +47,21 @@ pub(in crate::runtime) fn untimely(time: Timestamp, latest: Timestamp) -> Option
     }
 }
 
-/// What to do where readings say that it is `now`, and the host's clock says `wall`.
-fn clock_wrong(now: Timestamp, wall: Timestamp) -> String {
-    let hint = suspicion::like_a_zone(now.duration_since(wall));
+/// What to do where readings say that it is `now`, and the host's clock says `host_time`.
+fn clock_wrong(now: Timestamp, host_time: Timestamp) -> String {
+    let hint = suspicion::like_a_zone(now.duration_since(host_time));
     let hint = hint.map_or_else(String::new, |hint| {
         format!(". Or is the clock right? {hint}")
     });
     format!(
-        "the host's clock says {wall}, and there are readings of {now}: set it; what lies ahead of it waits{hint}"
+        "the host's clock says {host_time}, and there are readings of {now}: set it; what lies ahead of it waits{hint}"
     )
 }
 
-/// What to do where the host's clock says `wall`, and it is `now` by the readings and the time that ran since.
-fn clock_leapt(now: Timestamp, wall: Timestamp) -> String {
+/// What to do where the host's clock says `host_time`, and it is `now` by the readings and the time that ran since.
+fn clock_leapt(now: Timestamp, host_time: Timestamp) -> String {
     format!(
-        "the host's clock says {wall}, and by the newest readings and the time that ran since it is {now}: the host was suspended, \
+        "the host's clock says {host_time}, and by the newest readings and the time that ran since it is {now}: the host was suspended, \
          or its clock is wrong and has to be set. Until a reading agrees with it, silences are counted in the time that ran"
     )
 }
@@ -78,14 +78,18 @@ impl Site {
     ///
     /// # Errors
     /// When the state cannot be asked whether the value is known.
-    pub fn take(&mut self, arrival: &Arrival, wall: Timestamp) -> Result<Vec<Event>, StoreError> {
+    pub fn take(
+        &mut self,
+        arrival: &Arrival,
+        host_time: Timestamp,
+    ) -> Result<Vec<Event>, StoreError> {
         if matches!(arrival.input, Input::Trouble { .. }) {
             return Ok(self.step(self.data_now(), &arrival.input));
         }
         if let Input::Reading { benchmark, .. } = &arrival.input {
             self.waiting.are_taken(benchmark, arrival.time);
         }
-        if self.is_set_aside(arrival, wall) {
+        if self.is_set_aside(arrival, host_time) {
             return Ok(Vec::new());
         }
         if let Some(store) = &self.sinks.store
@@ -103,7 +107,7 @@ impl Site {
                 return Ok(Vec::new());
             }
         }
-        Ok(self.take_new(arrival, wall))
+        Ok(self.take_new(arrival, host_time))
     }
 
     /// Computes what the first of `next` lead to on all cores; of how many of them, at least one. Changes no event: an arrival
@@ -114,35 +118,35 @@ impl Site {
     }
 
     /// Takes a value that has not been taken, or is the last of its time again.
-    pub(super) fn take_new(&mut self, arrival: &Arrival, wall: Timestamp) -> Vec<Event> {
+    pub(super) fn take_new(&mut self, arrival: &Arrival, host_time: Timestamp) -> Vec<Event> {
         self.counts.taken += 1;
         if let Some(now) = self.now
-            && self.has_leapt(arrival, now, wall)
+            && self.has_leapt(arrival, now, host_time)
         {
             return self.step(now, &arrival.input);
         }
-        let mut events = self.doubt_first(arrival, wall);
-        self.keep_time(arrival, wall);
-        events.extend(self.pass_by(arrival.time, self.clock(wall)));
+        let mut events = self.doubt_first(arrival, host_time);
+        self.keep_time(arrival, host_time);
+        events.extend(self.pass_by(arrival.time, self.clock(host_time)));
         let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
         if let Input::Reading { benchmark, .. } = &arrival.input
             && let Some(finding) = self.answer(benchmark, arrival.time)
         {
             events.extend(self.step(now, &Input::Found(finding)));
         }
-        self.begin_past(arrival, wall);
+        self.begin_past(arrival, host_time);
         events.extend(self.step(now, &arrival.input));
-        events.extend(self.compare_with_clock(arrival, now, wall));
+        events.extend(self.compare_with_clock(arrival, now, host_time));
         for job in self.monitor.searches() {
             self.searches.start(job);
         }
         events
     }
 
-    /// What time it is at the site while the host's clock says `wall`; a replay has no clock but its readings.
-    fn clock(&self, wall: Timestamp) -> Option<Timestamp> {
+    /// What time it is at the site while the host's clock says `host_time`; a replay has no clock but its readings.
+    fn clock(&self, host_time: Timestamp) -> Option<Timestamp> {
         let is_watched = self.sinks.store.is_some();
-        is_watched.then(|| self.keeper.now(wall))
+        is_watched.then(|| self.keeper.now(host_time))
     }
 
     fn answer(
@@ -158,14 +162,14 @@ impl Site {
     }
 
     /// Whether the value is not to be taken now: it is from the future, or no clock gives its time.
-    fn is_set_aside(&mut self, arrival: &Arrival, wall: Timestamp) -> bool {
-        let latest = self.keeper.now(wall).max(wall);
+    fn is_set_aside(&mut self, arrival: &Arrival, host_time: Timestamp) -> bool {
+        let latest = self.keeper.now(host_time).max(host_time);
         let Some(why) = untimely(arrival.time, latest) else {
             return false;
         };
         if why == Untimely::Future {
             if self.sinks.store.is_some()
-                && (self.keeper.is_behind(wall) || self.may_prove_it(arrival))
+                && (self.keeper.is_behind(host_time) || self.may_prove_it(arrival))
             {
                 return self.hold(arrival);
             }
@@ -203,16 +207,16 @@ impl Site {
     ///
     /// # Errors
     /// As [`Site::take`].
-    pub fn release(&mut self, wall: Timestamp) -> Result<Vec<Event>, StoreError> {
+    pub fn release(&mut self, host_time: Timestamp) -> Result<Vec<Event>, StoreError> {
         let mut events = Vec::new();
         if self.held.is_empty() {
             return Ok(events);
         }
-        let latest = self.keeper.now(wall).max(wall);
-        let is_right = self.unproven.is_over() && !self.keeper.is_behind(wall);
+        let latest = self.keeper.now(host_time).max(host_time);
+        let is_right = self.unproven.is_over() && !self.keeper.is_behind(host_time);
         for arrival in std::mem::take(&mut self.held) {
             if is_right || arrival.time.duration_since(latest) <= clock::TOLERANCE {
-                events.extend(self.take(&arrival, wall)?);
+                events.extend(self.take(&arrival, host_time)?);
             } else {
                 self.held.push_back(arrival);
             }
@@ -234,7 +238,7 @@ impl Site {
     }
 
     /// Whether the time of a reading lies far ahead of everything that is known, and of the clock.
-    fn has_leapt(&self, arrival: &Arrival, now: Timestamp, wall: Timestamp) -> bool {
+    fn has_leapt(&self, arrival: &Arrival, now: Timestamp, host_time: Timestamp) -> bool {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return false;
         };
@@ -242,13 +246,13 @@ impl Site {
         self.sinks.store.is_some()
             && arrival.time > now
             && !is_near(now)
-            && !is_near(self.keeper.now(wall))
+            && !is_near(self.keeper.now(host_time))
             && self.monitor.leaps(benchmark, arrival.time)
     }
 
     /// Has the only reading of a benchmark wait where this one, its second, lies far before it, and neither the time at the site
     /// nor another benchmark is near to the first: with one wrong time stamp all honest readings would be late.
-    fn doubt_first(&mut self, arrival: &Arrival, wall: Timestamp) -> Vec<Event> {
+    fn doubt_first(&mut self, arrival: &Arrival, host_time: Timestamp) -> Vec<Event> {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return Vec::new();
         };
@@ -261,7 +265,7 @@ impl Site {
         let is_near = |time: Timestamp| first.duration_since(time).abs() <= NEAR;
         let is_other =
             |(one, newest): (&BenchmarkId, Timestamp)| one != benchmark && is_near(newest);
-        if is_near(self.keeper.now(wall)) || self.read.each().any(is_other) {
+        if is_near(self.keeper.now(host_time)) || self.read.each().any(is_other) {
             return Vec::new();
         }
         let (benchmark, time) = (benchmark.clone(), arrival.time);
@@ -269,7 +273,7 @@ impl Site {
     }
 
     /// Learns from a reading what time it is, and notes where it is one of a backlog.
-    fn keep_time(&mut self, arrival: &Arrival, wall: Timestamp) {
+    fn keep_time(&mut self, arrival: &Arrival, host_time: Timestamp) {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return;
         };
@@ -280,9 +284,10 @@ impl Site {
         let is_live = self.read.is_live(benchmark);
         self.keeper.knows(arrival.time, is_live);
         if is_live {
-            self.keeper.comes(benchmark.as_str(), arrival.time, wall);
+            self.keeper
+                .comes(benchmark.as_str(), arrival.time, host_time);
         }
-        let time = self.keeper.latest(wall);
+        let time = self.keeper.latest(host_time);
         let noted = self.monitor.behind(benchmark);
         let is_noted = noted.is_some_and(|noted| time.duration_since(noted).abs() < NOTED_FOR);
         let is_late = time.duration_since(arrival.time) > NOTED_FOR;
@@ -301,13 +306,13 @@ impl Site {
         &mut self,
         arrival: &Arrival,
         now: Timestamp,
-        wall: Timestamp,
+        host_time: Timestamp,
     ) -> Vec<Event> {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return Vec::new();
         };
         let is_newest = self.read.newest(benchmark) == Some(arrival.time);
-        let clock = self.keeper.now(wall).max(wall);
+        let clock = self.keeper.now(host_time).max(host_time);
         let is_ahead = suspicion::ahead(arrival.time, clock).is_some();
         if self.sinks.store.is_none() || !is_newest || is_ahead == self.monitor.is_ahead(benchmark)
         {
@@ -351,9 +356,9 @@ impl Site {
     }
 
     /// Everything there is has been read: what comes from now on is live, and what has given no reading is unknown.
-    pub(super) fn rest(&mut self, wall: Timestamp) -> Vec<Event> {
+    pub(super) fn rest(&mut self, host_time: Timestamp) -> Vec<Event> {
         self.read.rest();
-        self.prove(wall);
+        self.prove(host_time);
         let mut events = Vec::new();
         // Before the first reading there is no past that could be over.
         let is_read = self.read.count() > 0 && !self.is_crowded();
@@ -365,7 +370,7 @@ impl Site {
         if self.sinks.store.is_none() || !self.monitor.misses_some() {
             return events;
         }
-        let now = self.now.unwrap_or_else(|| self.keeper.now(wall));
+        let now = self.now.unwrap_or_else(|| self.keeper.now(host_time));
         events.extend(self.step(now, &Input::Notice(Notice::Watching)));
         events
     }
@@ -380,29 +385,32 @@ impl Site {
         events
     }
 
-    /// Lets data time pass, as far as time has passed at the site while the host's clock says `wall`, and says where
+    /// Lets data time pass, as far as time has passed at the site while the host's clock says `host_time`, and says where
     /// that clock is wrong.
-    pub fn live(&mut self, wall: Timestamp) -> Vec<Event> {
-        let now = self.keeper.now(wall);
-        let mut events = self.pass_by(now, self.clock(wall));
-        if let Some(lull) = self.keeper.in_doubt(wall) {
-            events.extend(self.judge_by(wall, lull));
+    pub fn live(&mut self, host_time: Timestamp) -> Vec<Event> {
+        let now = self.keeper.now(host_time);
+        let mut events = self.pass_by(now, self.clock(host_time));
+        if let Some(lull) = self.keeper.in_doubt(host_time) {
+            events.extend(self.judge_by(host_time, lull));
         }
         events.extend(self.end_silences(now));
-        let (is_behind, has_leapt) = (self.keeper.is_behind(wall), self.keeper.has_leapt(wall));
+        let (is_behind, has_leapt) = (
+            self.keeper.is_behind(host_time),
+            self.keeper.has_leapt(host_time),
+        );
         let notice = match (is_behind || has_leapt, self.monitor.clock_wrong()) {
             (true, None) => {
                 let held = self.held.len();
                 let text = if is_behind {
-                    clock_wrong(now, wall)
+                    clock_wrong(now, host_time)
                 } else {
-                    clock_leapt(now, wall)
+                    clock_leapt(now, host_time)
                 };
-                tracing::error!(%wall, site_time = %now, held, "{text}");
+                tracing::error!(%host_time, site_time = %now, held, "{text}");
                 Notice::ClockWrong { text }
             }
             (false, Some(_)) => {
-                tracing::warn!(%wall, "the host's clock is right again");
+                tracing::warn!(%host_time, "the host's clock is right again");
                 let text = "the host's clock is right again".to_owned();
                 Notice::ClockRight { text }
             }
@@ -443,7 +451,7 @@ impl Site {
         self.monitor.late().is_some() || self.owes_past()
     }
 
-    /// Whether the past before a first start has been read and is still to be gone through.
+    /// Whether the past before a first start has been read and is still to be judged.
     pub fn owes_past(&self) -> bool {
         let owes_past = self.monitor.owes_current() || self.monitor.owes_past();
         owes_past && !self.monitor.reads_past()

@@ -106,14 +106,14 @@ impl Site {
 
     /// The first reading of a benchmark that belongs to a history, or the first again: this is taken as on a first start, without the others, which
     /// are judged as before, having to wait until each of its readings has been judged.
-    pub(super) fn begin_past(&mut self, arrival: &Arrival, wall: Timestamp) {
+    pub(super) fn begin_past(&mut self, arrival: &Arrival, host_time: Timestamp) {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return;
         };
         if self.sinks.store.is_none()
             || self.monitor.reads_all_past()
             || (self.monitor.level(benchmark).is_some() && !self.monitor.begins_anew(benchmark))
-            || self.keeper.now(wall).duration_since(arrival.time) <= HISTORY
+            || self.keeper.now(host_time).duration_since(arrival.time) <= HISTORY
         {
             return;
         }

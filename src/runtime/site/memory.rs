@@ -8,7 +8,7 @@ use super::{
 };
 use crate::alert::Level;
 use crate::monitor::{
-    AlertState, EventKind, Input, MemoryPart, Monitor, SavedError, SearchJob, Settings,
+    AlertState, EventKind, Input, MemoryPart, Monitor, SavedError, SearchJob, Settings, from_bytes,
 };
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::delivered::delivery;
@@ -59,7 +59,7 @@ impl Site {
         if step > 0
             && let Err(error) = site.remember(&recorded)
         {
-            tracing::warn!(%error, "the memory cannot be used: everything that was taken in is gone through again");
+            tracing::warn!(%error, "the saved state cannot be used: all stored readings are judged again");
             step = 0;
         }
         // What was sent, or called off, stands in the outbox.
@@ -110,11 +110,10 @@ impl Site {
             .into_iter()
             .find_map(|part| part.body)
             .ok_or(SavedError::Incomplete)?;
-        let own: SiteMemory =
-            rmp_serde::from_slice(&body).map_err(|source| SavedError::Unreadable {
-                name: "site".to_owned(),
-                source,
-            })?;
+        let own: SiteMemory = from_bytes(&body).map_err(|source| SavedError::Unreadable {
+            name: "site".to_owned(),
+            source,
+        })?;
         self.monitor = Monitor::restore(&parts)?;
         own.asked
             .into_iter()
@@ -357,7 +356,7 @@ impl Site {
 fn waiting_alerts(store: &Store) -> Result<Vec<Alert>, StoreError> {
     let mut waiting = Vec::new();
     for body in store.waiting()? {
-        match rmp_serde::from_slice::<Alert>(&body) {
+        match from_bytes::<Alert>(&body) {
             Ok(alert) => waiting.push(alert),
             Err(error) => tracing::error!(%error, "an alert that waited cannot be read"),
         }

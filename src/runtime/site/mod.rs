@@ -254,7 +254,7 @@ impl Site {
         }
         self.shorten(&mut order);
         self.batch.taken(left.number);
-        tracing::warn!(?order, "people ask for something");
+        tracing::warn!(?order, "an order was given");
         let now = self.data_now();
         Ok(self.step(now, &Input::Order(order)))
     }
@@ -358,11 +358,11 @@ impl Site {
     /// When it cannot be made durable.
     pub async fn close(
         mut self,
-        wall: Timestamp,
+        host_time: Timestamp,
         limit: Duration,
     ) -> Result<Option<usize>, StoreError> {
         self.steps_since_memory = usize::MAX;
-        let recorded = self.commit(wall);
+        let recorded = self.commit(host_time);
         let lost = match self.sinks.alerts.take() {
             Some(alerts) => alerts.close(limit).await,
             None => Some(0),

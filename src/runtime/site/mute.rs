@@ -32,15 +32,15 @@ pub struct Mute {
 }
 
 impl Mute {
-    /// Whether it is in force while the host's clock says `wall`, by which it was given, right or wrong. Of one that would last
+    /// Whether it is in force while the host's clock says `host_time`, by which it was given, right or wrong. Of one that would last
     /// longer than it may, that clock has been set since.
-    fn is_in_force(&self, wall: Timestamp) -> bool {
+    fn is_in_force(&self, host_time: Timestamp) -> bool {
         let longest = match self.up_to {
             Some(_) => Order::LONGEST_SHELVE,
             None => Order::LONGEST_SILENCE,
         };
-        let left = self.until.duration_since(wall);
-        left <= longest + TOLERANCE && lasts((self.given_at, self.until), wall)
+        let left = self.until.duration_since(host_time);
+        left <= longest + TOLERANCE && lasts((self.given_at, self.until), host_time)
     }
 }
 
@@ -63,7 +63,12 @@ impl Mutes {
         (self.orders.clone(), self.put_off.clone())
     }
 
+    /// In place of the one of the same kind that there is for the same place: the newest order says how long.
     fn add(&mut self, mute: Mute) {
+        let stays = |one: &Mute| {
+            one.benchmark != mute.benchmark || one.up_to.is_some() != mute.up_to.is_some()
+        };
+        self.orders.retain(stays);
         self.orders.push(mute);
         let excess = self.orders.len().saturating_sub(MOST);
         self.orders.drain(..excess);
@@ -82,18 +87,18 @@ impl Mutes {
         self.put_off.drain(..excess);
     }
 
-    /// What was put off and can be sent while the host's clock says `wall`.
-    pub(super) fn no_longer_put_off(&mut self, wall: Timestamp) -> Vec<Alert> {
+    /// What was put off and can be sent while the host's clock says `host_time`.
+    pub(super) fn no_longer_put_off(&mut self, host_time: Timestamp) -> Vec<Alert> {
         let all = std::mem::take(&mut self.put_off);
-        let (muted, due) = all.into_iter().partition(|one| self.are_of(one, wall));
+        let (muted, due) = all.into_iter().partition(|one| self.are_of(one, host_time));
         self.put_off = muted;
         due
     }
 
-    /// Whether nobody is to be notified of this alert while the host's clock says `wall`.
-    pub(super) fn are_of(&self, alert: &Alert, wall: Timestamp) -> bool {
+    /// Whether nobody is to be notified of this alert while the host's clock says `host_time`.
+    pub(super) fn are_of(&self, alert: &Alert, host_time: Timestamp) -> bool {
         let place = (alert.event.benchmark.as_ref(), alert.level);
-        self.cover(place, |mute| mute.is_in_force(wall))
+        self.cover(place, |mute| mute.is_in_force(host_time))
     }
 
     /// Whether somebody asked not to be notified of it, and that may last still: until the next commit says it by the clock.
@@ -277,18 +282,20 @@ impl Site {
         }
     }
 
-    /// Who is not to be notified of what while the host's clock says `wall`.
-    pub fn mutes(&self, wall: Timestamp) -> Vec<Mute> {
+    /// Who is not to be notified of what while the host's clock says `host_time`.
+    pub fn mutes(&self, host_time: Timestamp) -> Vec<Mute> {
         let all = self.mutes.orders.iter();
-        all.filter(|mute| mute.is_in_force(wall)).cloned().collect()
+        all.filter(|mute| mute.is_in_force(host_time))
+            .cloned()
+            .collect()
     }
 
-    /// Has the hooks wait with what they have in hand where nobody is to be notified of it while the host's clock says `wall`.
-    pub(super) fn mute_what_is_in_hand(&self, wall: Timestamp) {
+    /// Has the hooks wait with what they have in hand where nobody is to be notified of it while the host's clock says `host_time`.
+    pub(super) fn mute_what_is_in_hand(&self, host_time: Timestamp) {
         if let Some(alerts) = &self.sinks.alerts {
             alerts.mute(&|place, level| {
                 self.mutes
-                    .cover((place, level), |mute| mute.is_in_force(wall))
+                    .cover((place, level), |mute| mute.is_in_force(host_time))
             });
         }
     }

@@ -53,11 +53,11 @@ impl Site {
     }
 
     /// All that came together has been seen: what is left was corrected back.
-    pub fn decide(&mut self, wall: Timestamp) -> Vec<Event> {
+    pub fn decide(&mut self, host_time: Timestamp) -> Vec<Event> {
         let mut events = Vec::new();
         for arrival in std::mem::take(&mut self.returned.0).into_values() {
             self.counts.repeated = self.counts.repeated.saturating_sub(1);
-            events.extend(self.take_new(&arrival, wall));
+            events.extend(self.take_new(&arrival, host_time));
         }
         events
     }

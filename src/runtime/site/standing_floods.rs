@@ -1,6 +1,7 @@
 //! What was reported together stands by one key until all of it is over, and its end goes to those who received its beginning.
 
 use super::{BEFORE_ALL, Site};
+use crate::monitor::from_bytes;
 use crate::reading::Timestamp;
 use crate::runtime::hook::{Alert, FLOOD};
 use crate::store::{DeliveryOutcome, Store, StoreError};
@@ -9,7 +10,7 @@ impl Site {
     /// What stood for many when the state was written.
     pub(super) fn recall_floods(&mut self, store: &Store) -> Result<(), StoreError> {
         for body in store.without_end(&format!("{FLOOD}/"))? {
-            let Ok(alert) = rmp_serde::from_slice::<Alert>(&body) else {
+            let Ok(alert) = from_bytes::<Alert>(&body) else {
                 tracing::error!("an alert of many benchmarks cannot be read");
                 continue;
             };
@@ -56,7 +57,7 @@ impl Site {
     }
 
     /// Offers those again that are in force: a hook may have been added, or have had no room.
-    pub(super) fn offer_floods_again(&self, wall: Timestamp) {
+    pub(super) fn offer_floods_again(&self, host_time: Timestamp) {
         let Some(alerts) = &self.sinks.alerts else {
             return;
         };
@@ -64,7 +65,7 @@ impl Site {
             let alert = &one.alert;
             let is_due =
                 alert.must_arrive() && !one.is_acknowledged && self.standing.has_in_force(alert);
-            if is_due && !self.mutes.are_of(alert, wall) {
+            if is_due && !self.mutes.are_of(alert, host_time) {
                 alerts.offer_where(alert, false, &|hook| hook.is_audience_of(alert));
             }
         }

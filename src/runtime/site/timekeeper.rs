@@ -101,55 +101,59 @@ impl Timekeeper {
         known.checked_add(passed).ok()
     }
 
-    /// Whether the host's clock, which says `wall`, is earlier than what is known.
-    pub(super) fn is_behind(&self, wall: Timestamp) -> bool {
+    /// Whether the host's clock, which says `host_time`, is earlier than what is known.
+    pub(super) fn is_behind(&self, host_time: Timestamp) -> bool {
         // Not the known time alone: it may be that of a reading of days ago, where all since came in time.
         self.estimate()
-            .is_some_and(|estimate| estimate.duration_since(wall) > TOLERANCE)
+            .is_some_and(|estimate| estimate.duration_since(host_time) > TOLERANCE)
     }
 
-    /// The time at the site, while the host's clock says `wall`.
-    pub(super) fn now(&self, wall: Timestamp) -> Timestamp {
+    /// The time at the site, while the host's clock says `host_time`.
+    pub(super) fn now(&self, host_time: Timestamp) -> Timestamp {
         let Some(estimate) = self.estimate() else {
-            return wall;
+            return host_time;
         };
-        let is_ahead = self.is_live && wall.duration_since(estimate) > BEHIND;
-        if self.is_behind(wall) || is_ahead {
+        let is_ahead = self.is_live && host_time.duration_since(estimate) > BEHIND;
+        if self.is_behind(host_time) || is_ahead {
             estimate
         } else {
-            wall
+            host_time
         }
     }
 
-    /// Whether the host's clock, which says `wall`, has gone on by far more than the time that ran since readings agreed with
+    /// Whether the host's clock, which says `host_time`, has gone on by far more than the time that ran since readings agreed with
     /// it: the host was suspended, or its clock was set ahead.
-    pub(super) fn has_leapt(&self, wall: Timestamp) -> bool {
-        let is_far = |estimate| wall.duration_since(estimate) > BEHIND;
+    pub(super) fn has_leapt(&self, host_time: Timestamp) -> bool {
+        let is_far = |estimate| host_time.duration_since(estimate) > BEHIND;
         self.is_live && self.is_proven && self.estimate().is_some_and(is_far)
     }
 
-    /// A live reading of `benchmark` and `time` has come while the host's clock says `wall`.
-    pub(super) fn comes(&mut self, benchmark: &str, time: Timestamp, wall: Timestamp) {
+    /// A live reading of `benchmark` and `time` has come while the host's clock says `host_time`.
+    pub(super) fn comes(&mut self, benchmark: &str, time: Timestamp, host_time: Timestamp) {
         if self.is_proven {
             return;
         }
-        let is_far_behind = wall.duration_since(time) > BEHIND;
+        let is_far_behind = host_time.duration_since(time) > BEHIND;
         self.is_proven = !is_far_behind || self.behind.are_steady_with(benchmark, time);
         if self.is_proven {
             self.behind = LatestReadings::default();
         }
     }
 
-    /// How late it may be at the site, while the host's clock says `wall`: as late as that where live readings lie far behind it
+    /// How late it may be at the site, while the host's clock says `host_time`: as late as that where live readings lie far behind it
     /// and may be a backlog as well as right.
-    pub(super) fn latest(&self, wall: Timestamp) -> Timestamp {
-        let now = self.now(wall);
-        if self.is_proven { now } else { now.max(wall) }
+    pub(super) fn latest(&self, host_time: Timestamp) -> Timestamp {
+        let now = self.now(host_time);
+        if self.is_proven {
+            now
+        } else {
+            now.max(host_time)
+        }
     }
 
-    /// For how long no reading has come, where the host's clock, which says `wall`, is far ahead of live ones that may be a backlog as well as right:
+    /// For how long no reading has come, where the host's clock, which says `host_time`, is far ahead of live ones that may be a backlog as well as right:
     /// what is due without a reading is judged by the clock then. `None` where it is not, or some have just come.
-    pub(super) fn in_doubt(&self, wall: Timestamp) -> Option<Lull> {
+    pub(super) fn in_doubt(&self, host_time: Timestamp) -> Option<Lull> {
         let since = self.came?.elapsed();
         let lull = if since < SHORT_LULL {
             return None;
@@ -158,7 +162,7 @@ impl Timekeeper {
         } else {
             Lull::Long
         };
-        (self.latest(wall) > self.now(wall)).then_some(lull)
+        (self.latest(host_time) > self.now(host_time)).then_some(lull)
     }
 
     /// A reading of `benchmark` and `time` lies beyond what the clock allows, and is held. Whether those of this
@@ -233,17 +237,17 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn what_came_far_behind_the_clock_is_in_doubt_once_no_more_comes_until_it_is_proven() {
-        let (mut keeper, wall) = (Timekeeper::default(), noon() + 1000.hours());
+        let (mut keeper, host_time) = (Timekeeper::default(), noon() + 1000.hours());
         for hour in 0..6 {
             keeper.knows(noon() + hour.hours(), true);
-            keeper.comes("5", noon() + hour.hours(), wall + hour.hours());
-            assert_eq!(keeper.in_doubt(wall + hour.hours()), None, "{hour}");
+            keeper.comes("5", noon() + hour.hours(), host_time + hour.hours());
+            assert_eq!(keeper.in_doubt(host_time + hour.hours()), None, "{hour}");
             tokio::time::advance(Duration::from_secs(60)).await;
-            let later = wall + hour.hours() + 1.minute();
+            let later = host_time + hour.hours() + 1.minute();
             let short = (hour < 3).then_some(Lull::Short);
             assert_eq!(keeper.in_doubt(later), short, "{hour}");
             tokio::time::advance(Duration::from_secs(3540)).await;
-            let later = wall + (hour + 1).hours();
+            let later = host_time + (hour + 1).hours();
             // The next of readings that come each hour is not late yet.
             assert_eq!(keeper.in_doubt(later), short, "{hour}");
         }
@@ -252,15 +256,15 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_lull_is_long_after_three_hours_or_three_intervals_of_the_readings() {
         for (apart, long) in [(10 * 60, 3 * 3600), (2 * 3600, 6 * 3600)] {
-            let (mut keeper, wall) = (Timekeeper::default(), noon() + 1000.hours());
+            let (mut keeper, host_time) = (Timekeeper::default(), noon() + 1000.hours());
             for reading in 0..2 {
                 let time = noon() + (reading * apart).seconds();
                 keeper.knows(time, true);
-                keeper.comes("5", time, wall);
+                keeper.comes("5", time, host_time);
             }
             for (after, lull) in [(long - 60, Lull::Short), (120, Lull::Long)] {
                 tokio::time::advance(Duration::from_secs(after)).await;
-                assert_eq!(keeper.in_doubt(wall), Some(lull), "{apart}");
+                assert_eq!(keeper.in_doubt(host_time), Some(lull), "{apart}");
             }
         }
     }
@@ -268,21 +272,21 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn far_behind_the_clock_readings_may_be_a_backlog_until_four_come_as_far_apart_as_measured()
      {
-        let (mut keeper, wall) = (Timekeeper::default(), noon() + 1000.hours());
+        let (mut keeper, host_time) = (Timekeeper::default(), noon() + 1000.hours());
         let comes = |keeper: &mut Timekeeper, minute: i64| {
             keeper.knows(noon() + minute.minutes(), true);
-            keeper.comes("5", noon() + minute.minutes(), wall);
+            keeper.comes("5", noon() + minute.minutes(), host_time);
         };
         for minute in 0..30 {
             comes(&mut keeper, minute);
-            assert_eq!(keeper.latest(wall), wall);
+            assert_eq!(keeper.latest(host_time), host_time);
         }
         for minute in 40..44 {
-            assert_eq!(keeper.latest(wall), wall, "{minute}");
+            assert_eq!(keeper.latest(host_time), host_time, "{minute}");
             tokio::time::advance(Duration::from_secs(600)).await;
             comes(&mut keeper, 10 * minute - 370);
         }
-        assert!(keeper.latest(wall) < noon() + 2.hours());
+        assert!(keeper.latest(host_time) < noon() + 2.hours());
     }
 
     #[test]

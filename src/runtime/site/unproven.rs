@@ -62,9 +62,9 @@ impl Unproven {
     }
 
     /// The past has been read: how late it is at least, where the clock is behind. `None` the next time.
-    pub(in crate::runtime) fn proven(&mut self, wall: Timestamp) -> Option<Timestamp> {
+    pub(in crate::runtime) fn proven(&mut self, host_time: Timestamp) -> Option<Timestamp> {
         let speaks_for_it = |(benchmark, newest): (&BenchmarkId, &Timestamp)| {
-            !self.ahead.contains_key(benchmark) && wall.duration_since(*newest) <= NEAR
+            !self.ahead.contains_key(benchmark) && host_time.duration_since(*newest) <= NEAR
         };
         let is_right = self.came.iter().any(speaks_for_it);
         let many = self.ahead.values().filter(|(_, count)| *count >= FEWEST);
@@ -88,10 +88,10 @@ impl Site {
     }
 
     /// The past has been read: what lies ahead of the clock is held on where the clock is behind, and set aside else.
-    pub(super) fn prove(&mut self, wall: Timestamp) {
-        let is_behind = self.keeper.is_behind(wall);
-        if let Some(latest) = self.unproven.proven(wall) {
-            tracing::warn!(%wall, %latest, "readings go on beyond the host's clock: they count, and the clock does not");
+    pub(super) fn prove(&mut self, host_time: Timestamp) {
+        let is_behind = self.keeper.is_behind(host_time);
+        if let Some(latest) = self.unproven.proven(host_time) {
+            tracing::warn!(%host_time, %latest, "readings go on beyond the host's clock: they count, and the clock does not");
             self.keeper.knows(latest, false);
             return;
         }
@@ -100,7 +100,7 @@ impl Site {
         }
         let (ahead, rest) = std::mem::take(&mut self.held)
             .into_iter()
-            .partition(|one: &Arrival| one.time.duration_since(wall) > TOLERANCE);
+            .partition(|one: &Arrival| one.time.duration_since(host_time) > TOLERANCE);
         self.held = rest;
         for arrival in ahead {
             self.set_aside(&arrival);

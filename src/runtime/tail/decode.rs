@@ -34,6 +34,11 @@ impl Arrival {
     }
 }
 
+/// Under this name stands how a source is read whose benchmarks the config does not name.
+pub(super) fn whatever() -> BenchmarkId {
+    BenchmarkId::new("")
+}
+
 /// What one source's files mean.
 #[derive(Debug, Clone)]
 pub(in crate::runtime) struct Decoder {
@@ -56,13 +61,17 @@ impl Decoder {
     pub(in crate::runtime) fn new(source: &FileSource, benchmarks: &[Benchmark]) -> Self {
         let conventions = source.conventions.clone();
         let wanted = of_source(&source.id, benchmarks);
-        let read_as = wanted.iter().map(|one| {
-            let read_as = one.read_as(&conventions, source.epoch);
-            (one.id.clone(), read_as)
-        });
+        let of_source = source.read_as();
+        let named = wanted
+            .iter()
+            .map(|one| (one.id.clone(), one.read_as(&of_source)));
+        let mut read_as: BTreeMap<BenchmarkId, String> = named.collect();
+        if wanted.is_empty() {
+            read_as.insert(whatever(), of_source);
+        }
         Self {
             kind: source.kind,
-            read_as: Arc::new(read_as.collect()),
+            read_as: Arc::new(read_as),
             conventions,
             dialect: source.dialect.clone(),
             epoch: source.epoch,

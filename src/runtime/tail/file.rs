@@ -307,8 +307,11 @@ impl FileTail {
         let moved = self.at != before;
         if moved {
             self.mark = read_at(&file, self.mark_start(), self.at - self.mark_start())?;
-            let is_at_end = self.at >= glance.size && matches!(self.content, Content::Text(_));
-            self.earlier = is_at_end.then(|| self.hash_of_earlier(&file)).transpose()?;
+            // What was read before a rewriting is compared with until the file is read anew, also by the next process.
+            if self.other_since.is_none() {
+                let is_at_end = self.at >= glance.size && matches!(self.content, Content::Text(_));
+                self.earlier = is_at_end.then(|| self.hash_of_earlier(&file)).transpose()?;
+            }
         }
         // A suspect record is looked at again although nothing changes any more.
         let suspect =

@@ -3,8 +3,10 @@
 use super::decode::{Arrival, Decoder};
 use super::departed::hold_newest;
 use super::file::FileTail;
+use super::position::Saved;
 use super::reorder::{Reorder, WaitingReading};
 use crate::config::{Benchmark, FilePattern, FileSource};
+use crate::monitor::from_bytes;
 use crate::reading::{Quantity, Timestamp};
 use crate::runtime::clock::Stopwatch;
 use crate::store::Position;
@@ -103,6 +105,17 @@ impl Follower {
         let files = saved
             .iter()
             .filter_map(|(name, body)| restored(&sources, name, body));
+        let is_followed = |name: &str| {
+            let source = name.split_once(':').map(|(source, _)| source);
+            sources.iter().any(|one| Some(one.id.as_str()) == source)
+        };
+        let left = |(name, body): &(String, Vec<u8>)| {
+            let saved: Saved = from_bytes(body).ok().filter(|_| !is_followed(name))?;
+            let body = rmp_serde::to_vec_named(&saved.left()?).ok()?;
+            let (name, body) = (name.clone(), Some(body));
+            Some(Position { name, body })
+        };
+        let left = saved.iter().filter_map(left).collect();
         Self {
             files: files.collect(),
             sources,
@@ -110,7 +123,7 @@ impl Follower {
             unlisted: BTreeMap::new(),
             looked: None,
             is_live: false,
-            at_once: Vec::new(),
+            at_once: left,
             lost: Vec::new(),
             not_text: BTreeSet::new(),
         }
@@ -159,8 +172,8 @@ impl Follower {
     /// Reads the next values. What the files held when a round began is merged by [`Arrival::rank`] over all
     /// files before the next round looks at them again: years of history in many files arrive as
     /// if they had come in live. Values of a source that waits for earlier ones go out when they have waited for long
-    /// enough, also by the wall clock's time, `wall`.
-    pub fn poll(&mut self, wall: Timestamp) -> ArrivalBatch {
+    /// enough, also by the wall clock's time, `host_time`.
+    pub fn poll(&mut self, host_time: Timestamp) -> ArrivalBatch {
         if self.heads.is_empty() {
             self.looked = Some(Stopwatch::start());
             self.rescan();
@@ -171,7 +184,7 @@ impl Follower {
             hold_newest(self.files.values_mut());
         }
         let mut arrivals = std::mem::take(&mut self.lost);
-        arrivals.extend(self.beside_a_backlog(wall));
+        arrivals.extend(self.beside_a_backlog(host_time));
         let most = if self.is_live { LIVE_BATCH } else { BATCH };
         let mut read = arrivals.len();
         let mut direct = Vec::new();
@@ -182,11 +195,11 @@ impl Follower {
                 continue;
             };
             read += 1;
-            direct.extend(next_of(file, &mut self.sources[key.0], wall));
+            direct.extend(next_of(file, &mut self.sources[key.0], host_time));
             file.refill();
             self.heads.extend(head(key, file));
         }
-        arrivals.extend(merged(self.release(wall), direct));
+        arrivals.extend(merged(self.release(host_time), direct));
         let is_due = |source: &Followed| source.reorder.as_ref().is_some_and(Reorder::is_due);
         let caught_up = self.heads.is_empty()
             && !self.sources.iter().any(is_due)
@@ -205,7 +218,7 @@ impl Follower {
 
     /// What has come to files that held no more, while a backlog is read from others: it is live, and goes first. Until all files have held
     /// no more once, every value has its place in the past.
-    fn beside_a_backlog(&mut self, wall: Timestamp) -> Vec<Arrival> {
+    fn beside_a_backlog(&mut self, host_time: Timestamp) -> Vec<Arrival> {
         let is_due = |looked: &Stopwatch| looked.elapsed() >= LOOK_BESIDE;
         if !self.is_live || self.heads.is_empty() || !self.looked.as_ref().is_some_and(is_due) {
             return Vec::new();
@@ -220,7 +233,7 @@ impl Follower {
             }
             file.refill();
             while live.len() < LIVE_BATCH / 2 && !file.pending.is_empty() {
-                live.extend(next_of(file, &mut self.sources[key.0], wall));
+                live.extend(next_of(file, &mut self.sources[key.0], host_time));
                 file.refill();
             }
             self.heads.extend(head(key.clone(), file));
@@ -229,11 +242,11 @@ impl Follower {
     }
 
     /// What has waited for long enough.
-    fn release(&mut self, wall: Timestamp) -> Vec<Arrival> {
+    fn release(&mut self, host_time: Timestamp) -> Vec<Arrival> {
         let mut arrivals = Vec::new();
         for source in &mut self.sources {
             if let Some(reorder) = &mut source.reorder {
-                arrivals.extend(reorder.release(wall, BATCH));
+                arrivals.extend(reorder.release(host_time, BATCH));
             }
         }
         arrivals.sort_by(|one, other| one.rank().cmp(&other.rank()));
@@ -284,12 +297,12 @@ fn restored(sources: &[Followed], name: &str, body: &[u8]) -> Option<(FileKey, F
 }
 
 /// The next value of a file; `None` where it waits for earlier ones of its source.
-fn next_of(file: &mut FileTail, source: &mut Followed, wall: Timestamp) -> Option<Arrival> {
+fn next_of(file: &mut FileTail, source: &mut Followed, host_time: Timestamp) -> Option<Arrival> {
     let arrival = file.pending.pop_front()?;
     // What a restart could not read again does not wait.
     match source.reorder.as_mut().filter(|_| !file.is_nameless()) {
         Some(reorder) => {
-            reorder.take(arrival, wall, file.changed);
+            reorder.take(arrival, host_time, file.changed);
             None
         }
         None => Some(arrival),

@@ -1,10 +1,11 @@
 //! The files that a state has read, as far as it keeps its place in them, beside those that a config asks for.
 
-use super::decode::Decoder;
+use super::decode::{Decoder, whatever};
 use super::file::read_at;
 use super::position::{Saved, SavedContent};
 use super::rescan::{is_ours, list};
 use crate::config::{Config, FileSource};
+use crate::monitor::from_bytes;
 use crate::reading::BenchmarkId;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
@@ -35,7 +36,7 @@ impl KnownFiles {
             let Some((_, path)) = name.split_once(':') else {
                 continue;
             };
-            let Ok(saved) = rmp_serde::from_slice::<Saved>(body) else {
+            let Ok(saved) = from_bytes::<Saved>(body) else {
                 continue;
             };
             if saved.at == 0 && saved.content == SavedContent::Anew {
@@ -54,6 +55,7 @@ impl KnownFiles {
                 continue;
             }
             let named = saved.read_as.iter().flat_map(|all| all.keys().cloned());
+            let named = named.filter(|id| *id != whatever());
             known.left.insert(path, named.collect());
         }
         known

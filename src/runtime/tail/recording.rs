@@ -82,13 +82,7 @@ impl FileTail {
     }
 
     fn take_message(&mut self, message: &RawMessage) {
-        let RawMessage {
-            topic,
-            metadata,
-            publish_time,
-            payload,
-        } = message;
-        match decode_message(topic, metadata, *publish_time, payload) {
+        match decode_message(message.channel(), message.publish_time, &message.payload) {
             Ok(item) => item.into_iter().for_each(|item| self.expect(item)),
             Err(error) => {
                 self.quarantined += 1;

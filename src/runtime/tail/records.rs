@@ -4,7 +4,8 @@
 //! seekable file leaves the length of the chunk it is filling at `u64::MAX` and comes back for it,
 //! so nothing of an unfinished record is kept: its header is read again each time.
 
-use mcap::records::{ChunkHeader, Record, op};
+use crate::runtime::ingest::{JSON, MessageChannel};
+use mcap::records::{Channel, ChunkHeader, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
 use serde::{Deserialize, Serialize};
@@ -78,10 +79,23 @@ pub struct RawMessage {
     pub topic: String,
     /// The channel's metadata.
     pub metadata: BTreeMap<String, String>,
+    /// How its messages are encoded: `json`, or it is not read.
+    pub encoding: String,
     /// When it was measured, nanoseconds in the channel's time base.
     pub publish_time: u64,
     /// The message itself.
     pub payload: Vec<u8>,
+}
+
+impl RawMessage {
+    /// What its channel says of it.
+    pub fn channel(&self) -> MessageChannel<'_> {
+        MessageChannel {
+            topic: &self.topic,
+            metadata: &self.metadata,
+            encoding: &self.encoding,
+        }
+    }
 }
 
 /// A record that cannot be used; the ones after it can.
@@ -105,14 +119,14 @@ pub enum RecordFault {
         /// The channel's number.
         id: u16,
     },
-    /// A channel's number that now means another topic.
+    /// A channel's number that now means something else: its messages are not read from there on.
     #[error("channel {id} was {before} and is now {after}")]
     ChannelReused {
         /// The channel's number.
         id: u16,
-        /// Its topic before.
+        /// Its topic and metadata before.
         before: String,
-        /// Its topic now.
+        /// Its topic and metadata now.
         after: String,
     },
 }
@@ -128,6 +142,9 @@ type Described = (String, BTreeMap<String, String>);
 pub struct Channels {
     /// Shared with the position that the file goes on from.
     by_id: Arc<BTreeMap<u16, Described>>,
+    /// How the messages of those are encoded that are not JSON.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    encodings: BTreeMap<u16, String>,
 }
 
 impl Channels {
@@ -145,22 +162,39 @@ impl Channels {
             .collect())
     }
 
+    /// Takes what the file says of a channel. One that was something else before is forgotten: nobody knows what its messages are.
+    fn describe(&mut self, channel: Channel) -> Result<(), RecordFault> {
+        let Channel {
+            id,
+            topic,
+            metadata,
+            message_encoding,
+            ..
+        } = channel;
+        let shown = |(topic, metadata): &Described| format!("{topic} {metadata:?}");
+        let meaning = (topic, metadata);
+        let channels = Arc::make_mut(&mut self.by_id);
+        if let Some(before) = channels.get(&id)
+            && *before != meaning
+        {
+            let (before, after) = (shown(before), shown(&meaning));
+            channels.remove(&id);
+            return Err(RecordFault::ChannelReused { id, before, after });
+        }
+        channels.insert(id, meaning);
+        self.encodings.remove(&id);
+        if message_encoding != JSON {
+            self.encodings.insert(id, message_encoding);
+        }
+        Ok(())
+    }
+
     /// The message, where the record is one.
     fn take(&mut self, opcode: u8, body: &[u8]) -> Result<Option<RawMessage>, RecordFault> {
         if opcode == op::CHANNEL
             && let Record::Channel(channel) = parse_record(opcode, body)?
         {
-            if let Some((before, _)) = self.by_id.get(&channel.id)
-                && *before != channel.topic
-            {
-                return Err(RecordFault::ChannelReused {
-                    id: channel.id,
-                    before: before.clone(),
-                    after: channel.topic,
-                });
-            }
-            let meaning = (channel.topic, channel.metadata);
-            Arc::make_mut(&mut self.by_id).insert(channel.id, meaning);
+            return self.describe(channel).map(|()| None);
         } else if opcode == op::MESSAGE
             && let Record::Message { header, data } = parse_record(opcode, body)?
         {
@@ -171,6 +205,7 @@ impl Channels {
             return Ok(Some(RawMessage {
                 topic: topic.clone(),
                 metadata: metadata.clone(),
+                encoding: (self.encodings.get(&id).cloned()).unwrap_or_else(|| JSON.to_owned()),
                 publish_time: header.publish_time,
                 payload: data.into_owned(),
             }));
@@ -277,7 +312,9 @@ mod tests {
             message(1, b"first"),
             message(7, b"of nobody"),
             channel(1, "/b"),
-            message(1, b"last"),
+            message(1, b"of nobody either"),
+            channel(2, "/c"),
+            message(2, b"last"),
         ];
         let body = chunk(&records.concat());
         let read = Channels::default().decode(op::CHUNK, &body).unwrap();
@@ -289,7 +326,8 @@ mod tests {
         let expected = [
             "first",
             "a message on the unknown channel 7",
-            "channel 1 was /a and is now /b",
+            "channel 1 was /a {} and is now /b {}",
+            "a message on the unknown channel 1",
             "last",
         ];
         assert_eq!(shown, expected);

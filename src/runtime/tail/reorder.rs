@@ -85,14 +85,19 @@ impl Reorder {
         self.acknowledged.extend(own.cloned());
     }
 
-    /// Holds a value that has been read at `wall`, of a file that was `changed` last at that time: it came no later, also where it is read
+    /// Holds a value that has been read at `host_time`, of a file that was `changed` last at that time: it came no later, also where it is read
     /// again after a restart.
-    pub(super) fn take(&mut self, arrival: Arrival, wall: Timestamp, changed: Option<Timestamp>) {
+    pub(super) fn take(
+        &mut self,
+        arrival: Arrival,
+        host_time: Timestamp,
+        changed: Option<Timestamp>,
+    ) {
         let (_, is_reading, ..) = arrival.rank();
         let key = (arrival.time, is_reading, self.came);
         self.came += 1;
         // A clock that is wrong by years must not send everything out that waits.
-        if arrival.time.duration_since(wall) <= clock::TOLERANCE {
+        if arrival.time.duration_since(host_time) <= clock::TOLERANCE {
             self.newest = self.newest.max(Some(arrival.time));
         }
         if let Input::Reading {
@@ -106,7 +111,7 @@ impl Reorder {
             });
         }
         self.numbers.insert(key.2);
-        let came = changed.map_or(wall, |changed| changed.min(wall));
+        let came = changed.map_or(host_time, |changed| changed.min(host_time));
         self.arrivals.push_back((came, key));
         self.held.insert(key, arrival);
         if self.held.len() > MOST_HELD {
@@ -154,8 +159,8 @@ impl Reorder {
         self.due = self.due.max(self.held.keys().next_back().copied());
     }
 
-    /// The values that need not wait any longer at `wall`, in the order of their measurement, `most` of them.
-    pub(super) fn release(&mut self, wall: Timestamp, most: usize) -> Vec<Arrival> {
+    /// The values that need not wait any longer at `host_time`, in the order of their measurement, `most` of them.
+    pub(super) fn release(&mut self, host_time: Timestamp, most: usize) -> Vec<Arrival> {
         if let Some(until) = self
             .newest
             .and_then(|newest| newest.checked_sub(self.window).ok())
@@ -164,10 +169,10 @@ impl Reorder {
         }
         while let Some((came, key)) = self.arrivals.front().copied() {
             // Whether the wall clock was set back in between nobody knows: then it counts from now on.
-            let waited = wall.duration_since(came);
+            let waited = host_time.duration_since(came);
             if waited < SignedDuration::ZERO {
                 for (came, _) in &mut self.arrivals {
-                    *came = wall.min(*came);
+                    *came = host_time.min(*came);
                 }
             }
             if waited < self.window && self.held.contains_key(&key) {

@@ -1,13 +1,18 @@
 //! A file put back to where a restart goes on in it, and that place as it moves.
 
-use super::decode::Decoder;
+use super::decode::{Decoder, whatever};
 use super::file::{Content, FileTail};
 use super::position::{Saved, SavedContent};
 use super::records::Channels;
 use super::text::{SavedText, TextReader};
+use crate::monitor::{from_bytes, means_the_same};
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
+
+/// Stands behind how a benchmark was read of a source that the config has no more.
+const LEFT: &str = ", and left out since";
 
 impl FileTail {
     /// The file as [`FileTail::moved`] reported it, perhaps to another process.
@@ -19,7 +24,7 @@ impl FileTail {
         decoder: Arc<Decoder>,
         body: &[u8],
     ) -> Result<Self, Box<dyn Error>> {
-        let saved: Saved = rmp_serde::from_slice(body)?;
+        let saved: Saved = from_bytes(body)?;
         let origin = saved.origin.clone().unwrap_or_else(|| path.clone());
         let rows = decoder.text_rows(&origin);
         let is_read_anew = saved.misses(&decoder);
@@ -80,7 +85,7 @@ impl FileTail {
             },
             ..Saved::default()
         };
-        let saved = acknowledged.and_then(|body| rmp_serde::from_slice(body).ok());
+        let saved = acknowledged.and_then(|body| from_bytes(body).ok());
         let saved = Saved {
             origin: Some(self.origin.clone()),
             ..saved.unwrap_or_else(from_its_start)
@@ -121,7 +126,30 @@ impl Saved {
             return false;
         };
         let now = decoder.read_as();
-        now.iter()
-            .any(|(id, read_as)| before.get(id) != Some(read_as))
+        // Earlier versions did not keep how a source is read that names no benchmarks.
+        let nothing = String::new();
+        now.iter().any(|(id, read_as)| {
+            let otherwise = (*id == whatever()).then_some(&nothing);
+            let before = before.get(id).or(otherwise);
+            before.is_none_or(|before| !means_the_same(before, read_as))
+        })
+    }
+
+    /// The same where the config has no such source: what it takes, should the config have it again, has been forgotten meanwhile. `None` where that
+    /// is noted.
+    pub(super) fn left(mut self) -> Option<Self> {
+        let mut read_as = self
+            .read_as
+            .take()
+            .map_or_else(BTreeMap::new, Arc::unwrap_or_clone);
+        read_as.entry(whatever()).or_default();
+        if read_as.values().all(|one| one.ends_with(LEFT)) {
+            return None;
+        }
+        for one in read_as.values_mut().filter(|one| !one.ends_with(LEFT)) {
+            *one += LEFT;
+        }
+        self.read_as = Some(Arc::new(read_as));
+        Some(self)
     }
 }

@@ -11,6 +11,7 @@ use crate::monitor::{
 };
 use crate::reading::{
     BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
+    unix_seconds,
 };
 use crate::runtime::alarm_state::Alarms;
 use crate::runtime::standing::{TakenOrders, in_force};
@@ -81,9 +82,9 @@ pub struct ForecastView {
     pub failure_time: FailureTime,
     /// How likely it is that a collapse comes at all.
     pub chances_of_collapse: Option<ChancesOfCollapse>,
-    /// The chance of that within the evacuation time, as levels go by it.
+    /// The chance of that within the evacuation time, as levels use it.
     pub chance_within_evacuation_time: f64,
-    /// The chance of that within the outlook, as levels go by it.
+    /// The chance of that within the outlook, as levels use it.
     pub chance_within_outlook: f64,
     /// The level that it calls for, and the chances that levels are called by.
     pub called: Option<CalledLevel>,
@@ -288,7 +289,7 @@ impl SiteReader {
             })?;
             let points: Vec<ThinPoint> = samples
                 .iter()
-                .map(|sample| (seconds(sample.time), sample.value))
+                .map(|sample| (unix_seconds(sample.time), sample.value))
                 .collect();
             covariates.push(Covariate {
                 name,
@@ -345,14 +346,10 @@ impl SiteReader {
     }
 }
 
-fn seconds(time: Timestamp) -> f64 {
-    time.as_millisecond() as f64 / 1e3
-}
-
 fn points(series: &Series) -> Vec<ThinPoint> {
     let readings = series.readings.iter();
     readings
-        .map(|reading| (seconds(reading.time), reading.value))
+        .map(|reading| (unix_seconds(reading.time), reading.value))
         .collect()
 }
 
@@ -372,7 +369,7 @@ fn velocities(series: &Series, most: usize) -> ViewColumns {
         return ViewColumns::default();
     };
     let rates = rates(series, RateOptions { most });
-    let second = |rate: &Rate| SECONDS_PER_DAY.mul_add(rate.middle(), seconds(first.time));
+    let second = |rate: &Rate| SECONDS_PER_DAY.mul_add(rate.middle(), unix_seconds(first.time));
     ViewColumns {
         t: rates.iter().map(second).collect(),
         v: rates.iter().map(|rate| rate.velocity).collect(),
@@ -401,7 +398,7 @@ fn line(series: &Series, latest: Option<&Event>) -> Option<[ThinPoint; 2]> {
     let zero = days_since(start, inverse_velocity.failure_time?);
     let rates = rates(&until, RateOptions::default());
     let segment = InverseVelocityLine::segment(recent(&rates), zero)?;
-    Some(segment.map(|(day, height)| (SECONDS_PER_DAY.mul_add(day, seconds(start)), height)))
+    Some(segment.map(|(day, height)| (SECONDS_PER_DAY.mul_add(day, unix_seconds(start)), height)))
 }
 
 fn forecast(event: &Event) -> Option<ForecastView> {

@@ -45,9 +45,9 @@ pub struct Standing {
     pub failure_time: Option<FailureTime>,
     /// How likely it was then that a collapse comes at all.
     pub chances_of_collapse: Option<ChancesOfCollapse>,
-    /// The chance of that within the evacuation time, as levels go by it.
+    /// The chance of that within the evacuation time, as levels use it.
     pub chance_within_evacuation_time: Option<f64>,
-    /// The chance of that within the outlook, as levels go by it.
+    /// The chance of that within the outlook, as levels use it.
     pub chance_within_outlook: Option<f64>,
     /// The level that this forecast calls for, and the chances that levels are called by.
     pub called: Option<CalledLevel>,

@@ -18,7 +18,7 @@ use crate::fit::{Rate, RateOptions};
 use crate::forecast::{LawForecaster, Passage, by_the_law};
 use crate::reading::Quantity;
 
-/// What the monitor goes by.
+/// What the monitor uses.
 pub(super) fn panel(known: &Known) -> Option<Passage> {
     let outlook =
         LawForecaster::default().update(&known.observations, known.critical_mm_per_day)?;

@@ -11,14 +11,14 @@ use super::straight::Straight;
 use super::{line, moves, point, rates};
 use crate::fit::Rate;
 use crate::forecast::{InverseVelocityLine, Passage};
+use crate::reading::upper_median;
 use crate::score::Known;
 
 /// The line weighted by the flow; `None` where no river is known.
 pub(in crate::score) fn weighted_line(known: &Known) -> Option<Passage> {
     let beside = beside(known);
     let mut flows: Vec<f64> = beside.iter().map(|(_, flow)| *flow).collect();
-    flows.sort_by(f64::total_cmp);
-    let median = *flows.get(flows.len() / 2)?;
+    let median = upper_median(&mut flows)?;
     let points: Vec<(f64, f64, f64)> = beside
         .iter()
         .filter(|(rate, _)| moves(rate))

@@ -86,11 +86,11 @@ mod tests {
     #[test]
     fn a_wall_is_not_passed_and_the_work_is_bounded() {
         let calls = std::cell::Cell::new(0);
-        let walled = |at: &[f64; 1]| {
+        let bounded = |at: &[f64; 1]| {
             calls.set(calls.get() + 1);
             if at[0] < 2.0 { f64::NAN } else { at[0] }
         };
-        let (at, cost) = descend(walled, [5.0], [1.0], 60);
+        let (at, cost) = descend(bounded, [5.0], [1.0], 60);
         assert!((2.0..2.1).contains(&at[0]), "{at:?}");
         assert!((cost - at[0]).abs() < 1e-12);
         assert!(calls.get() <= 62, "{}", calls.get());

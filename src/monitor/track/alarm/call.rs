@@ -8,10 +8,9 @@ use crate::alert::{
 use crate::forecast::HORIZON_DAYS;
 use crate::monitor::event::{AlertState, CalledLevel, Event, EventKind, LevelChance};
 use crate::monitor::motion::{are_first, moves_backwards, settled};
-use crate::monitor::track::days;
 use crate::monitor::track::forecast::{EARLY, Forecast, LookAhead};
 use crate::monitor::track::record::BenchmarkRecord;
-use crate::reading::{Timestamp, figure, shortest};
+use crate::reading::{Timestamp, days_of, figure, shortest};
 use jiff::SignedDuration;
 
 impl Alarm {
@@ -53,7 +52,7 @@ impl Alarm {
         }
         evidence.unusual = self.occurrences.calling(time);
         evidence.early_quantile_days = forecast.and_then(|forecast| {
-            let outlook = forecast.in_force(days(policy.outlook));
+            let outlook = forecast.in_force(days_of(policy.outlook));
             outlook.collapse.quantile(EARLY, HORIZON_DAYS)
         });
         evidence.was_red = self.was_red(policy, time);
@@ -88,7 +87,7 @@ impl Alarm {
         let call = policy.call(evidence);
         let of = |chance: f64, span: SignedDuration, at_least: f64| LevelChance {
             chance,
-            within_hours: days(span) * 24.0,
+            within_hours: days_of(span) * 24.0,
             at_least,
         };
         let red = evidence.chance_for_red?;

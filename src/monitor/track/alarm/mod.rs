@@ -6,7 +6,6 @@ mod occurrences;
 mod overdue;
 mod resolved;
 
-use super::days;
 use super::forecast::Forecast;
 use super::record::BenchmarkRecord;
 use crate::alert::{AlertCause, AlertEvidence, Held, Latch, Level, Policy};
@@ -14,7 +13,7 @@ use crate::fit::Rate;
 use crate::monitor::event::{AlertState, Event, EventKind, REMOVED};
 use crate::monitor::kept::KeptForecast;
 use crate::monitor::motion::observed;
-use crate::reading::Timestamp;
+use crate::reading::{Timestamp, days_of};
 use serde::Serialize;
 
 pub(super) use levels::Levels;
@@ -60,7 +59,7 @@ impl BesideForecast<'_> {
                 self.record.observations(),
                 rates,
                 time,
-                days(policy.evacuation_time),
+                days_of(policy.evacuation_time),
             )
         }
     }
@@ -163,7 +162,7 @@ impl Alarm {
         }
         let is_kept = self.level() > Level::Green;
         self.kept = forecast.filter(|_| is_kept).map(|forecast| {
-            let outlook = forecast.in_force(days(policy.outlook));
+            let outlook = forecast.in_force(days_of(policy.outlook));
             KeptForecast::of(time, &outlook.collapse)
         });
     }
@@ -174,12 +173,16 @@ impl Alarm {
     }
 
     /// Goes by the rules that held at the end of the past; where a higher level was in force there, by that level, which is
-    /// returned.
+    /// returned. One that has been called since and has ended, because people know why or the slope slowed down, stays so: the next reading
+    /// calls it again, if it does.
     pub(super) fn go_on_from(&mut self, past: Self) -> Option<(Level, Timestamp)> {
         self.held = past.held;
         self.occurrences = past.occurrences;
         let in_force = past.latch.in_force();
-        let Some((level, since)) = in_force.filter(|(level, _)| *level > self.level()) else {
+        let is_open = |(level, _): &(Level, Timestamp)| {
+            *level > self.level() && !self.latch.has_ended(*level)
+        };
+        let Some((level, since)) = in_force.filter(is_open) else {
             self.levels.go_on_from(past.levels);
             return None;
         };

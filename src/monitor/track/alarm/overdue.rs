@@ -6,10 +6,9 @@ use super::call::alert_of;
 use crate::alert::{AlertEvidence, Level, Policy, chance_in_words, hours_in_words};
 use crate::monitor::event::Event;
 use crate::monitor::kept::KeptForecast;
-use crate::monitor::track::days;
 use crate::monitor::track::forecast::Forecast;
 use crate::monitor::track::record::BenchmarkRecord;
-use crate::reading::{SECONDS_PER_DAY, Timestamp};
+use crate::reading::{SECONDS_PER_DAY, Timestamp, days_of};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -32,12 +31,12 @@ pub(in crate::monitor::track) struct Overdue {
 impl Overdue {
     /// `None` where the forecast never comes to that within the outlook.
     fn of(policy: &Policy, time: Timestamp, forecast: &Forecast) -> Option<Self> {
-        let outlook = forecast.in_force(days(policy.outlook));
+        let outlook = forecast.in_force(days_of(policy.outlook));
         let chances = KeptForecast::of(time, &outlook.chances);
         let interval = outlook.interval_days * SECONDS_PER_DAY;
         let interval = SignedDuration::try_from_secs_f64(interval).ok()?;
         let is_red = |now: Timestamp| {
-            chances.chance_within(now, days(policy.red_within())) >= policy.red_chance
+            chances.chance_within(now, days_of(policy.red_within())) >= policy.red_chance
         };
         let checks = (1..=MOST_CHECKS).map_while(|check| {
             let after = policy.evacuation_time.checked_mul(check)? / CHECKS_AN_EVACUATION;
@@ -99,7 +98,7 @@ impl Alarm {
         let (newest, overdue) = (read_last(record)?, self.overdue.take()?);
         let chance = overdue
             .chances
-            .chance_within(until, days(policy.red_within()));
+            .chance_within(until, days_of(policy.red_within()));
         let evidence = AlertEvidence {
             now,
             chance_for_red: Some(chance),

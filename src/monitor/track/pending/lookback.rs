@@ -8,10 +8,9 @@ use crate::monitor::event::{Event, EventKind};
 use crate::monitor::history::History;
 use crate::monitor::motion::observed;
 use crate::monitor::track::alarm::Levels;
-use crate::monitor::track::days;
 use crate::monitor::track::forecast::{Forecast, LookAhead};
 use crate::monitor::track::record::BenchmarkRecord;
-use crate::reading::Timestamp;
+use crate::reading::{Timestamp, days_of};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -129,7 +128,7 @@ fn highest(
             highest = highest.max(latch.level());
         }
     };
-    let course = days(policy.red_course_fades());
+    let course = days_of(policy.red_course_fades());
     let begins = values.partition_point(|one| one.t_days < since - course);
     for index in newest_of(begins..first, MOST_BEFORE) {
         after(index, false);
@@ -156,7 +155,7 @@ fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Ale
     });
     let forecast = forecast.as_ref();
     let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
-    let evacuation_days = days(policy.evacuation_time);
+    let evacuation_days = days_of(policy.evacuation_time);
     let observed = observed(observations, rates, now, evacuation_days);
     LookAhead::of(policy, forecast).evidence(policy, forecast, observed)
 }

@@ -19,12 +19,12 @@ pub(super) struct Pending {
     has_unjudged_late: bool,
     /// The first reading of a queue that has not been judged, nor has one after it.
     queued_since: Option<Timestamp>,
-    /// Whether its past has been gone through.
+    /// Whether its past has been judged.
     #[serde(rename = "record")]
     past: PastReview,
 }
 
-/// Whether the readings from before a first start have been gone through.
+/// Whether the readings from before a first start have been judged.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum PastReview {
     #[default]
@@ -83,17 +83,17 @@ impl Pending {
         (self.has_unjudged_late, self.queued_since) = (false, None);
     }
 
-    /// The readings from before a first start are to be gone through.
+    /// The readings from before a first start are to be judged.
     pub(super) fn begin_past(&mut self) {
         self.past = PastReview::Owed;
     }
 
-    /// They have been gone through.
+    /// They have been judged.
     pub(super) fn end_past(&mut self) {
         self.past = PastReview::Known;
     }
 
-    /// Takes out what only who has gone through the past can say, until that has been done.
+    /// Takes out what only who has judged the past can say, until that has been done.
     pub(super) fn hold_back(&self, events: &mut Vec<Event>) {
         if self.past == PastReview::Owed {
             events.retain(|event| !event.kind.is_of_the_record());

@@ -5,9 +5,8 @@ use super::DataQuality;
 use super::unknown::Reason;
 use crate::alert::{Level, Policy};
 use crate::monitor::event::Event;
-use crate::monitor::track::days;
 use crate::monitor::track::record::BenchmarkRecord;
-use crate::reading::{Timestamp, figure};
+use crate::reading::{Timestamp, days_of, figure};
 
 /// Readings of a second quantity in a row that are reported, where the first quantity has hardly been read.
 const FEW_OTHERS: u32 = 3;
@@ -40,7 +39,7 @@ impl DataQuality {
             events.extend(self.sticks(record, time, count, since, what));
         }
         let before = self.spoilt_by;
-        let shows_within = days(policy.evacuation_time / SHOWS_WITHIN);
+        let shows_within = days_of(policy.evacuation_time / SHOWS_WITHIN);
         let critical = policy.critical_velocity_mm_per_day;
         let history = record.history();
         self.spoilt_by = history

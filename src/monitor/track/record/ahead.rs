@@ -4,8 +4,7 @@
 use super::BenchmarkRecord;
 use crate::monitor::event::Event;
 use crate::monitor::history::MeasuredAs;
-use crate::monitor::track::days;
-use crate::reading::{Reading, Timestamp, Unit};
+use crate::reading::{Reading, Timestamp, Unit, days_of};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +45,7 @@ impl BenchmarkRecord {
             self.benchmark,
             reading.time,
             self.newest
-                .map_or(0.0, |newest| days(reading.time.duration_since(newest)))
+                .map_or(0.0, |newest| days_of(reading.time.duration_since(newest)))
         );
         self.ahead = Some(HeldReading {
             unit: source.unit,
@@ -79,7 +78,7 @@ impl BenchmarkRecord {
             "benchmark {}: the reading of {}, its first, lies {:.1} days after the next one: it counts once another one confirms it",
             self.benchmark,
             reading.time,
-            days(reading.time.duration_since(time))
+            days_of(reading.time.duration_since(time))
         );
         self.ahead = Some(HeldReading {
             unit: source.unit,

@@ -9,7 +9,7 @@ use crate::monitor::declared::Declarations;
 use crate::monitor::event::{Event, EventKind, SITE};
 use crate::monitor::history::{History, MeasuredAs, Taken};
 use crate::monitor::silence::Silence;
-use crate::reading::{BenchmarkId, Quantity, Reading, Timestamp, Unit};
+use crate::reading::{BenchmarkId, Quantity, Reading, Timestamp, Unit, days_of};
 use jiff::SignedDuration;
 use serde::Serialize;
 
@@ -224,7 +224,7 @@ impl BenchmarkRecord {
             "benchmark {}: {count} readings of {from} to {to}, as by a logger whose clock is not set, lie {:.0} days \
              before all others: left out",
             self.benchmark,
-            super::days(self.history.first()?.duration_since(to)),
+            days_of(self.history.first()?.duration_since(to)),
         );
         Some(self.fault(now, "clock-not-set", text))
     }

@@ -181,7 +181,7 @@ export function described(event) {
     case 'unexplained-residual': return event.surprise_nats === undefined
       ? `residual with structure since ${minute(event.since)}, like an undeclared load (s.d. ${figure(event.load_sd)} e-folds)`
       : `a reading nobody expected (surprise ${figure(event.surprise_nats)} nats)`;
-    case 'effect-found': return `effect found: ${event.effect}${event.channel ? ` by ${event.channel}` : ''}, ${EXPLAINED[event.explained] ?? event.explained}${event.adopted ? '; forecasts go by it from here on' : ''}`;
+    case 'effect-found': return `effect found: ${event.effect}${event.channel ? ` by ${event.channel}` : ''}, ${EXPLAINED[event.explained] ?? event.explained}${event.adopted ? '; forecasts use it from here on' : ''}`;
     case 'effect-dropped': return `effect dropped: ${event.effect}${event.channel ? ` by ${event.channel}` : ''}`;
     default: return event.text ? `${event.event}: ${event.text}` : event.event;
   }

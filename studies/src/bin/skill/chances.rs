@@ -149,7 +149,7 @@ pub(crate) fn levels_section(out: &mut String, scored: &Scored) {
     let _ = writeln!(
         out,
         "\n## Detection and false alarms\n\nThe panel's chances at the default policy's figures: red from {} within {hours} hours, orange from {} and yellow from {} within {days} \
-         days. Each row by its own figure; the policy's hold-off, hysteresis and plain thresholds are not in this.\n\nShare of failing slopes called, by time before the failure:",
+         days. Each row by its own figure; the rules by which red is confirmed and levels end, and thresholds, are not in this.\n\nShare of failing slopes called, by time before the failure:",
         policy.red_chance, policy.orange_chance, policy.yellow_chance
     );
     let leads = [&SIMULATED_LEADS[..], &SHORT_LEADS[..]].concat();

@@ -65,7 +65,7 @@ may not be redistributed, and without them their sections are left out.
 
 - A forecast made at a time knows what had been *measured* by then, river and readings alike, and nothing later. When readings reach the
   monitor is another matter, and is not scored here.
-- `{PANEL}` is what the monitor goes by; `slider-block` the law alone under an undeclared load; all others are rivals as published
+- `{PANEL}` is what the monitor uses; `slider-block` the law alone under an undeclared load; all others are rivals as published
   (`slipwatch score --help` and src/score/method.rs name the sources), and `persistence` predicts from the newest velocity that nothing changes.
 - CRPS: the integral over time of (F(t) − 1{{failed by t}})², days. It and nothing else is cut at {LONGEST_SCORED_DAYS} days or {RECORDS_SCORED} lengths of the
   record, whichever is less, and at the end of a record without failure. A point forecast is a step, and scores its error.

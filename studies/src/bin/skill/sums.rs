@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 pub(crate) const SEED: u64 = 1;
 /// What the program itself says; every other method is a rival.
 pub(crate) const OURS: [&str; 2] = ["panel", "slider-block"];
-/// The first of them: what the monitor goes by.
+/// The first of them: what the monitor uses.
 pub(crate) const PANEL: &str = OURS[0];
 
 /// What is reported of each series, as the document groups it.

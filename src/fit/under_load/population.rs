@@ -40,7 +40,7 @@ const SEED: u64 = 2004;
 
 /// One law of the population.
 #[derive(Debug, Clone, Copy)]
-struct Walker {
+struct Member {
     at: Point,
     ln: f64,
 }
@@ -62,9 +62,9 @@ pub(super) struct DrawnLaw {
 }
 
 /// A population on its way.
-pub(super) struct Walk {
+pub(super) struct Population {
     scales: LawWeigher,
-    walkers: Vec<Walker>,
+    members: Vec<Member>,
     generator: Pcg64,
     rounds: usize,
     /// The likeliest laws that a descent found.
@@ -99,31 +99,34 @@ fn shares_of_power(lns: impl Iterator<Item = f64> + Clone, power: f64) -> Vec<f6
     weights.map(|weight| weight / total).collect()
 }
 
-impl Walk {
+impl Population {
     /// A population about the laws of the table, each in proportion to its weight.
     pub(super) fn about(cells: &[Cell], search: GridSearch) -> Option<Self> {
         let GridSearch { record, prior, .. } = search;
-        let mut walk = Self {
+        let mut population = Self {
             scales: LawWeigher::new(Space::new(prior, &record), record),
-            walkers: Vec::new(),
+            members: Vec::new(),
             generator: Pcg64::seed_from_u64(SEED),
             rounds: 0,
             modes: Vec::new(),
         };
-        let mut tried: Vec<Walker> =
+        let mut tried: Vec<Member> =
             Vec::with_capacity(WALKERS * (CHOSEN_FROM + CHOSEN_ABOUT_MODES));
         let weights = cells.iter().map(|cell| cell.weight);
         for index in in_proportion(weights, WALKERS * CHOSEN_FROM) {
-            let at = walk.scales.space.near(&cells[index], &mut walk.generator);
-            tried.push(walk.walker(at));
+            let at = population
+                .scales
+                .space
+                .near(&cells[index], &mut population.generator);
+            tried.push(population.member(at));
         }
-        walk.try_modes(cells, &mut tried);
-        walk.choose(&tried);
-        (!walk.walkers.is_empty()).then_some(walk)
+        population.try_modes(cells, &mut tried);
+        population.choose(&tried);
+        (!population.members.is_empty()).then_some(population)
     }
 
     /// Laws about the likeliest ones, of each as many as it has of the root of the posterior.
-    fn try_modes(&mut self, cells: &[Cell], tried: &mut Vec<Walker>) {
+    fn try_modes(&mut self, cells: &[Cell], tried: &mut Vec<Member>) {
         let modes = modes(cells, &mut self.scales);
         self.modes = modes.iter().map(|(_, mode)| mode.at).collect();
         let shares = shares_of_root(modes.iter().map(|(_, mode)| mode.ln));
@@ -135,21 +138,21 @@ impl Walk {
                 near = space.without_memory(&near, &mut self.generator);
             }
             let at = mode.draw(&near, &mut self.generator);
-            tried.push(self.walker(at));
+            tried.push(self.member(at));
         }
     }
 
     /// A law of the population there.
-    fn walker(&mut self, at: Point) -> Walker {
+    fn member(&mut self, at: Point) -> Member {
         let ln = self.scales.ln_posterior(&at, f64::NEG_INFINITY);
-        Walker { at, ln }
+        Member { at, ln }
     }
 
     /// Chooses the population: by the root of the posterior, so that it is wider than that.
-    fn choose(&mut self, tried: &[Walker]) {
+    fn choose(&mut self, tried: &[Member]) {
         let shares = shares_of_root(tried.iter().map(|one| one.ln));
         let chosen = in_proportion(shares.into_iter(), WALKERS);
-        self.walkers = chosen.into_iter().map(|index| tried[index]).collect();
+        self.members = chosen.into_iter().map(|index| tried[index]).collect();
     }
 
     /// Begins again about the likeliest laws that a descent finds from these laws of today, from the best of the population, and from
@@ -178,14 +181,14 @@ impl Walk {
                 space.with_any_memory(&mode.at, &mut self.generator)
             };
             let at = mode.draw(&near, &mut self.generator);
-            tried.push(self.walker(at));
+            tried.push(self.member(at));
         }
         self.choose_many(&tried);
     }
 
     /// The modes found from these laws, from the best of the population and from the modes so far.
     fn find_modes(&mut self, laws: &[Law]) -> Vec<Mode> {
-        let best = self.walkers.iter().max_by(|a, b| a.ln.total_cmp(&b.ln));
+        let best = self.members.iter().max_by(|a, b| a.ln.total_cmp(&b.ln));
         let mut starts: Vec<Point> = best.map(|best| best.at).into_iter().collect();
         starts.extend(&self.modes);
         let scatter = best.map_or(0.01, |best| best.at[SCATTER].exp());
@@ -202,7 +205,7 @@ impl Walk {
     }
 
     /// Chooses the population by the root of the posterior, or by as much a lower power as leaves it enough different laws.
-    fn choose_many(&mut self, tried: &[Walker]) {
+    fn choose_many(&mut self, tried: &[Member]) {
         let mut power = 0.5;
         loop {
             let shares = shares_of_power(tried.iter().map(|one| one.ln), power);
@@ -212,7 +215,7 @@ impl Walk {
             let squares: f64 = shares.iter().map(|share| share * share).sum();
             if squares * ENOUGH_APART <= 1.0 || power < LEAST_POWER {
                 let chosen = in_proportion(shares.into_iter(), WALKERS);
-                self.walkers = chosen.into_iter().map(|index| tried[index]).collect();
+                self.members = chosen.into_iter().map(|index| tried[index]).collect();
                 return;
             }
             power *= 0.5;
@@ -221,16 +224,16 @@ impl Walk {
 
     /// Laws of the population that are far less likely than its best come to rest late: each is put where one of the others is.
     pub(super) fn leave_behind(&mut self) {
-        let lns = self.walkers.iter().map(|one| one.ln);
+        let lns = self.members.iter().map(|one| one.ln);
         let least = lns.fold(f64::NEG_INFINITY, f64::max) - FAR_BEHIND;
-        let kept = self.walkers.iter().filter(|one| one.ln >= least);
-        let kept: Vec<Walker> = kept.copied().collect();
+        let kept = self.members.iter().filter(|one| one.ln >= least);
+        let kept: Vec<Member> = kept.copied().collect();
         if kept.len() < FEWEST_KEPT {
             return;
         }
-        for walker in &mut self.walkers {
-            if walker.ln < least {
-                *walker = kept[self.generator.random_range(0..kept.len())];
+        for member in &mut self.members {
+            if member.ln < least {
+                *member = kept[self.generator.random_range(0..kept.len())];
             }
         }
     }
@@ -245,7 +248,7 @@ impl Walk {
     /// Moves each law of the population once.
     pub(super) fn round(&mut self) {
         self.rounds += 1;
-        let count = self.walkers.len();
+        let count = self.members.len();
         let shaken = self.spread() * SHAKEN;
         let step = if self.rounds.is_multiple_of(WHOLE) {
             1.0
@@ -257,29 +260,29 @@ impl Walk {
             let one = other(self.generator.random_range(1..count.max(2)));
             let two = other(self.generator.random_range(1..count.max(2)));
             let size: f64 = self.generator.sample(StandardNormal);
-            let along = self.walkers[one].at - self.walkers[two].at;
+            let along = self.members[one].at - self.members[two].at;
             let shake = Point::from_fn(|_, _| self.generator.sample::<f64, _>(StandardNormal));
             let size = if step < 1.0 {
                 step * (VARIED * size).exp()
             } else {
                 step
             };
-            let at = self.walkers[index].at + along * size + shake.component_mul(&shaken);
+            let at = self.members[index].at + along * size + shake.component_mul(&shaken);
             let luck = self.generator.random::<f64>().max(1e-300).ln();
-            let least = self.walkers[index].ln + luck;
+            let least = self.members[index].ln + luck;
             let ln = self.scales.ln_posterior(&at, least);
             if ln >= least {
-                self.walkers[index] = Walker { at, ln };
+                self.members[index] = Member { at, ln };
             }
         }
     }
 
     /// Standard deviations of the population.
     fn spread(&self) -> Point {
-        let count = self.walkers.len() as f64;
-        let mean = self.walkers.iter().map(|one| one.at).sum::<Point>() / count;
+        let count = self.members.len() as f64;
+        let mean = self.members.iter().map(|one| one.at).sum::<Point>() / count;
         let squares = self
-            .walkers
+            .members
             .iter()
             .map(|one| (one.at - mean).map(|away| away * away));
         (squares.sum::<Point>() / count).map(f64::sqrt)
@@ -287,7 +290,7 @@ impl Walk {
 
     /// Doubts the rates that the best law so far cannot explain, and weighs the population again.
     pub(super) fn doubt(&mut self) {
-        let best = self.walkers.iter().max_by(|a, b| a.ln.total_cmp(&b.ln));
+        let best = self.members.iter().max_by(|a, b| a.ln.total_cmp(&b.ln));
         if let Some(at) = best.map(|best| best.at) {
             self.doubt_by(&at);
         }
@@ -300,18 +303,18 @@ impl Walk {
         let lane = (0, scales.space.noise(at).scatter);
         let squares = evidence::misses(&scales.record, &scales.predicted, lane, &gains);
         scales.record.doubt(&squares);
-        for walker in &mut self.walkers {
-            walker.ln = scales.ln_posterior(&walker.at, f64::NEG_INFINITY);
+        for member in &mut self.members {
+            member.ln = scales.ln_posterior(&member.at, f64::NEG_INFINITY);
         }
     }
 
     /// The population as it is, each law with a start and a velocity drawn.
     pub(super) fn draw(&mut self) -> Vec<DrawnLaw> {
-        let mut drawn = Vec::with_capacity(self.walkers.len());
-        for walker in &self.walkers {
-            let (_, gains, shape) = self.scales.weigh(&walker.at, f64::NEG_INFINITY);
+        let mut drawn = Vec::with_capacity(self.members.len());
+        for member in &self.members {
+            let (_, gains, shape) = self.scales.weigh(&member.at, f64::NEG_INFINITY);
             let shares = [0; 2].map(|_| self.generator.random::<f64>());
-            let noise = self.scales.space.noise(&walker.at);
+            let noise = self.scales.space.noise(&member.at);
             let deviate = self.generator.sample(StandardNormal);
             let scales = &self.scales;
             let started = evidence::start_at(&gains, &scales.room, shares[0]);
@@ -321,7 +324,7 @@ impl Walk {
                 started,
                 variance: noise.scatter.powi(2) + noise.sigma.powi(2),
                 deviate,
-                ln: walker.ln,
+                ln: member.ln,
             }));
         }
         drawn

@@ -25,7 +25,7 @@ const DRAIN_LIMIT: Duration = Duration::from_secs(10);
 
 /// What is played, and to whom it is shown.
 #[derive(Debug)]
-pub struct Exhibit<'a> {
+pub struct ServedReplay<'a> {
     /// What was measured.
     pub recording: &'a Recording,
     /// How the monitor judges it.
@@ -42,7 +42,7 @@ pub struct Exhibit<'a> {
 
 /// Why nothing is shown.
 #[derive(Debug, thiserror::Error)]
-pub enum ExhibitError {
+pub enum ServedReplayError {
     /// The state cannot be used.
     #[error(transparent)]
     State(#[from] StoreError),
@@ -55,38 +55,42 @@ pub enum ExhibitError {
 /// a multi-threaded tokio runtime.
 ///
 /// # Errors
-/// [`ExhibitError`].
+/// [`ServedReplayError`].
 pub async fn show(
-    exhibit: Exhibit<'_>,
+    served_replay: ServedReplay<'_>,
     folder: &Path,
     mut shutdown: Shutdown,
     opened: &mut (dyn FnMut(std::net::SocketAddr) + '_),
-) -> Result<(), ExhibitError> {
+) -> Result<(), ServedReplayError> {
     let store = Arc::new(Store::open(folder)?);
-    let reader = Some(Arc::new(SiteReader::open(folder, exhibit.facts.clone())?));
+    let reader = Some(Arc::new(SiteReader::open(
+        folder,
+        served_replay.facts.clone(),
+    )?));
     let archive = Some(Arc::new(super::archive::Events::of(Arc::clone(&store))) as _);
     let vitals = Arc::new(Vitals::default());
     vitals.update(|health| (health.is_caught_up, health.is_store_writable) = (true, true));
     let behind = ServedState { archive, reader };
-    let server = Server::open(exhibit.options.clone(), Arc::clone(&vitals), behind).await?;
+    let server = Server::open(served_replay.options.clone(), Arc::clone(&vitals), behind).await?;
     opened(server.address());
     let delivered = Delivered::of(Arc::clone(&store));
-    let alerts = Dispatcher::start(exhibit.hooks, &Retry::default(), delivered);
+    let alerts = Dispatcher::start(served_replay.hooks, &Retry::default(), delivered);
     let sinks = Sinks {
         store: Some(Arc::clone(&store)),
         alerts: Some(alerts),
         status: Status::Exercise,
     };
-    let site = Site::new(&exhibit.facts.name, exhibit.settings, sinks);
+    let site = Site::new(&served_replay.facts.name, served_replay.settings, sinks);
     let mut stage = Stage {
         site,
         store,
         vitals,
     };
-    let arrivals = arrivals(exhibit.recording);
+    let arrivals = arrivals(served_replay.recording);
     let started = clock::later(Duration::ZERO);
     for arrival in &arrivals {
-        let due = started + wait(exhibit.pace, arrivals[0].time, arrival.time).unwrap_or_default();
+        let due =
+            started + wait(served_replay.pace, arrivals[0].time, arrival.time).unwrap_or_default();
         stage.wait(Some(due), &mut shutdown).await?;
         if shutdown.is_requested() {
             break;
