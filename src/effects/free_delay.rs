@@ -21,6 +21,8 @@ const SETTLED: f64 = 0.01;
 const HALVINGS: usize = 2;
 /// What had gathered before a covariate's first value is fitted where it counts at more readings than these.
 const FEWEST_EARLY: usize = 8;
+/// And where 95 % of the response have passed within this share of the record.
+const LONGEST_START: f64 = 1.0 / 3.0;
 /// What a step must lower the BIC by.
 const HELPS: f64 = 0.05;
 /// The shortest delay that is tried, spacings of the covariate; none becomes this when it is made longer.
@@ -211,7 +213,9 @@ impl Search<'_> {
             ..response
         };
         let is_of_load = matches!(term.act, Act::Load(_));
-        let counts = is_of_load && driver.remembers_its_start(response, early);
+        // What is forgotten as slowly as the record lasts would be any bend.
+        let is_short = response.memory_days() <= LONGEST_START * self.problem.span();
+        let counts = is_of_load && is_short && driver.remembers_its_start(response, early);
         let own = only_column(&term.act)?;
         let mut columns = vec![own.to_vec()];
         for nudged in [Some(later), counts.then_some(more)].into_iter().flatten() {

@@ -90,6 +90,9 @@ pub struct Filtered {
     pub stages: u8,
     /// Mean delay, days.
     pub mean_days: f64,
+    /// By how much what had gathered before the channel's first value differs from what is usual, in its unit.
+    #[serde(default)]
+    pub before: f64,
     /// Mean of the response over that record, in the channel's unit (per day, for a rate).
     pub mean: f64,
     /// Standard deviation of it.
@@ -256,7 +259,7 @@ impl Filtered {
             form: self.form,
             stages: self.stages,
             mean_days: self.mean_days,
-            before: 0.0,
+            before: self.before,
         }
     }
 
@@ -351,6 +354,7 @@ fn filtered(term: &Term, drivers: &[Driver], nodes: &[f64]) -> Option<Filtered> 
         form: response.form,
         stages: response.stages,
         mean_days: response.mean_days,
+        before: response.before,
         mean,
         deviation,
     })

@@ -28,6 +28,7 @@ pub(crate) fn found(slope: Slope) -> SearchFinding {
         form: Form::Level,
         stages: 1,
         mean_days: DELAY,
+        before: 0.0,
         mean: 0.0,
         deviation: 1.0,
     };

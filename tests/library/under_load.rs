@@ -125,12 +125,14 @@ fn slopes_that_stood_never_have_their_5_percent_quantile_within_the_evacuation_t
         &recording("la-clapiere-1982-1995-reconstruction.mcap"),
         None,
     ));
+    let mut judged = 0;
     for series in all {
         let observations = observations(&series);
         for value in &observations.values {
             let Some(outlook) = at(&observations, value.t_days) else {
                 continue;
             };
+            judged += 1;
             let low = outlook.passage.quantile(0.05, HORIZON_DAYS);
             assert!(
                 low.is_none_or(|days| days > 1.0),
@@ -139,6 +141,7 @@ fn slopes_that_stood_never_have_their_5_percent_quantile_within_the_evacuation_t
             );
         }
     }
+    assert!(judged > 100, "{judged}");
 }
 
 /// The outlook of a simulated slope at the last reading that leaves at least `lead` days, and what remained.

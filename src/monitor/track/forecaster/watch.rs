@@ -388,6 +388,7 @@ mod tests {
                 form: Form::Level,
                 stages: 1,
                 mean_days,
+                before: 0.0,
                 mean: 0.0,
                 deviation: 1.0,
             },
