@@ -118,6 +118,7 @@ impl Threshold {
             .map(|(rule, ..)| rule)
     }
 }
+
 /// Whether a rule rests on motion that was measured, and on no forecast.
 pub fn is_observed(rule: &str) -> bool {
     [

@@ -56,6 +56,7 @@ use jiff::SignedDuration;
 use problem::ConfigProblems;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
+use std::fmt;
 use std::io;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -222,34 +223,19 @@ impl FileSource {
     pub fn read_as(&self) -> String {
         let mut times = zone_in_words(&self.conventions);
         times.extend(self.epoch.map(|epoch| format!("day 0 on {epoch}")));
-        let mut words = Vec::new();
-        let usual = Dialect::default();
-        let dialect = &self.dialect;
-        let mut other = |is_other: bool, text: String| words.extend(is_other.then_some(text));
         let clock = self.conventions.clock.summer_time;
-        other(clock != SummerTime::default(), format!("dst {clock:?}"));
         let missing = self.conventions.missing.in_words();
-        other(!missing.is_empty(), format!("missing {missing}"));
-        other(
-            dialect.decimal != usual.decimal,
-            format!("decimal {:?}", dialect.decimal),
-        );
-        other(
-            dialect.thousands != usual.thousands,
-            format!("thousands {:?}", dialect.thousands),
-        );
-        other(
-            dialect.delimiter != usual.delimiter,
-            format!("delimiter {:?}", dialect.delimiter),
-        );
-        other(
-            dialect.time_columns != usual.time_columns,
-            format!("time columns {:?}", dialect.time_columns),
-        );
-        other(
-            dialect.time_format != usual.time_format,
-            format!("time format {:?}", dialect.time_format),
-        );
+        let (own, usual) = (&self.dialect, Dialect::default());
+        let each = [
+            (clock != SummerTime::default()).then(|| format!("dst {clock:?}")),
+            (!missing.is_empty()).then(|| format!("missing {missing}")),
+            unlike("decimal", &own.decimal, &usual.decimal),
+            unlike("thousands", &own.thousands, &usual.thousands),
+            unlike("delimiter", &own.delimiter, &usual.delimiter),
+            unlike("time columns", &own.time_columns, &usual.time_columns),
+            unlike("time format", &own.time_format, &usual.time_format),
+        ];
+        let words: Vec<String> = each.into_iter().flatten().collect();
         let written = if words.is_empty() {
             "as usual".to_owned()
         } else {
@@ -264,6 +250,11 @@ impl Broker {
     fn read_as(&self) -> String {
         zone_in_words(&self.conventions).join(", ")
     }
+}
+
+/// A value with its name, where it is not the usual one.
+fn unlike<T: PartialEq + fmt::Debug>(name: &str, own: &T, usual: &T) -> Option<String> {
+    (own != usual).then(|| format!("{name} {own:?}"))
 }
 
 fn zone_in_words(conventions: &Conventions) -> Vec<String> {

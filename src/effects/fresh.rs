@@ -49,13 +49,7 @@ pub(super) fn plain_starts(problem: &Problem) -> Vec<Start> {
         if problem.quantity == Quantity::Displacement {
             parameters.push(problem.y[0]);
         }
-        Start {
-            terms: Vec::new(),
-            parameters,
-            noise: Noise::WHITE,
-            frozen: 0,
-            holds_shape: false,
-        }
+        Start::of_law(parameters)
     };
     shapes.into_iter().map(start).collect()
 }

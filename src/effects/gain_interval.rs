@@ -10,7 +10,7 @@ use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::{Fitted, Start, jacobian, towards};
 use super::response::{Driver, Response};
-use super::term::{Scratch, Term, coefficients_of, law_parameters};
+use super::term::{Scratch, Term, coefficients_of};
 use crate::reading::CHI_SQUARED_90;
 
 /// 90 % quantile of chi squared with one degree of freedom, and how near to it a bound is looked for.
@@ -62,11 +62,7 @@ pub(super) fn interval(
 fn with_last(ready: &Ready, full: &Fitted, index: usize) -> Option<Start> {
     let problem = &ready.problem;
     let mut start = Start::at(full);
-    let place = law_parameters(problem)
-        + full.terms[..index]
-            .iter()
-            .map(Term::coefficients)
-            .sum::<usize>();
+    let place = coefficients_of(problem, &full.terms, index).start;
     let term = start.terms.remove(index);
     let gain = start.parameters.remove(place);
     if term.coefficients() != 1 {

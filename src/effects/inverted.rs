@@ -1,7 +1,6 @@
 //! Where the inversion of the law under a constant load ends, as starts of the plain law: a law that goes to failure within a few days
 //! of the last reading, or leaves a steady state late, is reached from no start that only looks at the first readings.
 
-use super::noise::Noise;
 use super::problem::Problem;
 use super::refit::Start;
 use super::term::{Scratch, parameters_of};
@@ -27,13 +26,7 @@ pub(super) fn inverted_starts(problem: &Problem, scratch: &mut Scratch) -> Vec<S
                 parameters.push(found.displacement_at_start);
             }
             outliving(problem, &mut parameters, scratch);
-            Start {
-                terms: Vec::new(),
-                parameters,
-                noise: Noise::WHITE,
-                frozen: 0,
-                holds_shape: false,
-            }
+            Start::of_law(parameters)
         })
         .collect()
 }

@@ -413,7 +413,6 @@ fn under_learned(
     let mut under = |parameters: &[f64], coefficients: &[f64]| {
         let start = Start {
             frozen: coefficients.len(),
-            holds_shape: false,
             parameters: [&parameters[..law], coefficients].concat(),
             ..Start::at(after)
         };

@@ -99,6 +99,17 @@ impl Start {
         self
     }
 
+    /// A law alone, under white noise.
+    pub(super) fn of_law(parameters: Vec<f64>) -> Self {
+        Self {
+            terms: Vec::new(),
+            parameters,
+            noise: Noise::WHITE,
+            frozen: 0,
+            holds_shape: false,
+        }
+    }
+
     /// `fitted` as it is.
     pub(super) fn at(fitted: &Fitted) -> Self {
         Self {

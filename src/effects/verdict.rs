@@ -430,14 +430,7 @@ mod tests {
             .unwrap();
         // Fails after some two thirds of the record where nothing slows it.
         let law = vec![0.0, 1.5, -3.0, 0.0, 0.0];
-        let start = Start {
-            parameters: law,
-            terms: Vec::new(),
-            noise: super::super::noise::Noise::WHITE,
-            frozen: 0,
-            holds_shape: false,
-        };
-        let start = start.with_size(&term, -by);
+        let start = Start::of_law(law).with_size(&term, -by);
         let white = Whitener::new(&problem, start.noise);
         let scratch = &mut Scratch::default();
         let fitted = super::super::refit::towards(&problem, &start, &white, (0, scratch));

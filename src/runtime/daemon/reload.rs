@@ -43,8 +43,8 @@ impl Daemon {
 
     /// Whether the hooks of `fresh` are those at work, and the files that they took when they were set up are as they were. They go on then: no red
     /// waits until a hook that runs has ended.
-    fn keeps_hooks(&self, fresh: &Config) -> bool {
-        fresh.hooks == self.config.hooks && read_by_hooks(fresh) == self.read_by_hooks
+    fn keeps_hooks(&self, fresh: &Config, read: u64) -> bool {
+        fresh.hooks == self.config.hooks && read == self.read_by_hooks
     }
 
     /// The config file as it is now with its token, or why it cannot be taken.
@@ -146,7 +146,9 @@ impl Daemon {
         self.site.show(&self.pulse.vitals);
         (self.pulse.vitals).retain(|benchmark| self.site.shows(benchmark));
         self.commit()?;
-        if !self.keeps_hooks(&fresh) {
+        // Before they are set up: what changes meanwhile is seen at the next reload.
+        let read = read_by_hooks(&fresh);
+        if !self.keeps_hooks(&fresh, read) {
             self.close_hooks().await;
             self.site
                 .rehook(dispatcher(&fresh, &self.store, self.pulse.vitals.faults()))?;
@@ -163,7 +165,7 @@ impl Daemon {
         let has_lost_hooks = fresh.hooks.is_empty() && !self.config.hooks.is_empty();
         let were_fileless = sources_without_files(&self.config);
         (self.files_are_read, self.is_up_to_date) = (false, false);
-        self.read_by_hooks = read_by_hooks(&fresh);
+        self.read_by_hooks = read;
         self.config = fresh;
         self.pulse.service.ready("watching");
         tracing::info!(file = %self.config.file.display(), "the config is taken");
