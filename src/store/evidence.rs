@@ -4,7 +4,7 @@ use super::read::decode;
 use super::{Store, StoreError, timestamp};
 use crate::monitor::{Input, Settings};
 use crate::reading::Timestamp;
-use rusqlite::{Connection, params};
+use rusqlite::Connection;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::fs::File;
@@ -42,19 +42,16 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn placed_events(&self, kind: &str) -> Result<Vec<PlacedEvent>, StoreError> {
-        let inner = self.inner();
         // The second condition lets SQLite use the index of all events but refits.
-        let mut query = inner.connection.prepare_cached(
-            "SELECT seq, step, body FROM event WHERE kind = ?1 AND kind != 'refit' ORDER BY seq",
-        )?;
-        let rows = query.query_map([kind], |row| {
+        let query =
+            "SELECT seq, step, body FROM event WHERE kind = ?1 AND kind != 'refit' ORDER BY seq";
+        self.rows(query, [kind], |row| {
             Ok(PlacedEvent {
                 seq: row.get(0)?,
                 step: row.get(1)?,
                 body: row.get(2)?,
             })
-        })?;
-        Ok(rows.collect::<Result<_, _>>()?)
+        })
     }
 
     /// The settings that were in force at a step; `None` where none had been given yet.
@@ -81,14 +78,11 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn closed_deliveries(&self) -> Result<Vec<[String; 4]>, StoreError> {
-        let inner = self.inner();
-        let mut query = inner.connection.prepare_cached(
-            "SELECT hook, key, level, state FROM outbox WHERE status = 'closed' ORDER BY id",
-        )?;
-        let rows = query.query_map([], |row| {
+        let query =
+            "SELECT hook, key, level, state FROM outbox WHERE status = 'closed' ORDER BY id";
+        self.rows(query, [], |row| {
             Ok([row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?])
-        })?;
-        Ok(rows.collect::<Result<_, _>>()?)
+        })
     }
 
     /// How many deliveries wait, and when the oldest of their alerts was called.
@@ -111,11 +105,9 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn deliveries_of(&self, key: &str) -> Result<Vec<DeliveryRow>, StoreError> {
-        let inner = self.inner();
-        let mut query = inner.connection.prepare_cached(
-            "SELECT hook, level, state, status, attempts FROM outbox WHERE key = ?1 ORDER BY id",
-        )?;
-        let rows = query.query_map(params![key], |row| {
+        let query =
+            "SELECT hook, level, state, status, attempts FROM outbox WHERE key = ?1 ORDER BY id";
+        self.rows(query, [key], |row| {
             Ok(DeliveryRow {
                 hook: row.get(0)?,
                 level: row.get(1)?,
@@ -123,8 +115,7 @@ impl Store {
                 status: row.get(3)?,
                 attempts: row.get(4)?,
             })
-        })?;
-        Ok(rows.collect::<Result<_, _>>()?)
+        })
     }
 
     /// Writes to `file`, which is not there yet, a state that holds the steps up to number `step` and nothing else: what a replay

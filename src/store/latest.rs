@@ -1,13 +1,16 @@
 //! The newest event of each kind at each benchmark: what is asked for without going through all events.
 
-use super::sum::{is_whole, sum};
+use super::sum::{self, is_whole, sum};
 use super::{Store, StoreError};
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Row, params};
+use std::ops::Range;
 
 /// Rows after a number, so many, each with its sum behind its values.
 pub(super) const ROWS: &str = "SELECT rowid, benchmark, kind, body, sum FROM latest
      WHERE rowid > ?1 ORDER BY rowid LIMIT ?2";
+/// The columns of [`ROWS`] whose values the sum is over.
+const SUMMED: Range<usize> = 1..4;
 
 impl Store {
     /// The JSON of the newest event of `kind` at each benchmark.
@@ -35,22 +38,13 @@ impl Store {
 
 /// Whether a row of [`ROWS`] is what was written. Its number changes with each newer event, and is not in the sum.
 pub(super) fn is_as_written(row: &Row<'_>) -> rusqlite::Result<bool> {
-    is_whole(row, 1..4)
+    is_whole(row, SUMMED)
 }
 
 /// Gives each row its sum, taken for what was written.
 pub(super) fn seal_all(connection: &Connection) -> Result<(), StoreError> {
-    let mut query = connection.prepare(ROWS)?;
-    let mut rows = query.query([0, i64::MAX])?;
-    while let Some(row) = rows.next()? {
-        let number: i64 = row.get(0)?;
-        let values = (1..4).map(|index| row.get_ref(index));
-        let values: Vec<ValueRef<'_>> = values.collect::<Result<_, _>>()?;
-        connection
-            .prepare_cached("UPDATE latest SET sum = ?2 WHERE rowid = ?1")?
-            .execute([number, sum(&values)])?;
-    }
-    Ok(())
+    let update = "UPDATE latest SET sum = ?2 WHERE rowid = ?1";
+    sum::seal_all(connection, ROWS, &SUMMED, update)
 }
 
 /// Keeps the newest event of a kind at a benchmark.

@@ -30,7 +30,7 @@ pub use read::{LeftOrder, Recorded, StepRow};
 pub use verify::Verified;
 
 use crate::reading::Timestamp;
-use rusqlite::{Connection, ErrorCode, OpenFlags, ffi};
+use rusqlite::{Connection, ErrorCode, OpenFlags, Params, Row, ffi};
 use series::Catalogue;
 use std::fs::{File, Metadata, TryLockError};
 use std::io;
@@ -320,6 +320,19 @@ impl Store {
             (Ok(ours), Ok(there)) => ours == there,
             (Err(_), _) | (_, Err(_)) => false,
         }
+    }
+
+    /// What `of` makes of each row that a query finds.
+    fn rows<T>(
+        &self,
+        query: &str,
+        given: impl Params,
+        of: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
+    ) -> Result<Vec<T>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(query)?;
+        let rows = query.query_map(given, of)?;
+        Ok(rows.collect::<Result<_, _>>()?)
     }
 
     fn inner(&self) -> MutexGuard<'_, Inner> {

@@ -176,12 +176,9 @@ impl Store {
     /// [`StoreError`].
     pub fn awaited(&self, alert: AlertIdentity<'_>) -> Result<Vec<String>, StoreError> {
         let AlertIdentity { key, level, state } = alert;
-        let inner = self.inner();
-        let mut query = inner.connection.prepare_cached(
-            "SELECT hook FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND status = 'waiting'",
-        )?;
-        let rows = query.query_map(params![key, level, state], |row| row.get(0))?;
-        Ok(rows.collect::<Result<_, _>>()?)
+        let query = "SELECT hook FROM outbox
+             WHERE key = ?1 AND level = ?2 AND state = ?3 AND status = 'waiting'";
+        self.rows(query, params![key, level, state], |row| row.get(0))
     }
 
     /// Ends deliveries that nothing will make, and has their alerts wait for other hooks in the same transaction. `singly`: what one of

@@ -108,12 +108,9 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn channels(&self) -> Result<Vec<(String, Option<String>)>, StoreError> {
-        let inner = self.inner();
-        let mut query = inner.connection.prepare_cached(
-            "SELECT name, min(unit) FROM series WHERE NOT is_reading GROUP BY name ORDER BY name",
-        )?;
-        let rows = query.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
-        Ok(rows.collect::<Result<_, _>>()?)
+        let query =
+            "SELECT name, min(unit) FROM series WHERE NOT is_reading GROUP BY name ORDER BY name";
+        self.rows(query, [], |row| Ok((row.get(0)?, row.get(1)?)))
     }
 
     /// When the newest reading of a benchmark was measured, of those measured at or before `until`.
@@ -198,14 +195,13 @@ impl Store {
         until: Timestamp,
         most: usize,
     ) -> Result<Vec<String>, StoreError> {
-        let inner = self.inner();
         // The second condition lets SQLite use the index of all events but refits.
-        let mut query = inner.connection.prepare_cached(
-            "SELECT body FROM event WHERE kind = ?1 AND kind != 'refit' AND time <= ?2 ORDER BY seq DESC LIMIT ?3",
-        )?;
+        let query = "SELECT body FROM event WHERE kind = ?1 AND kind != 'refit' AND time <= ?2
+             ORDER BY seq DESC LIMIT ?3";
         let most = i64::try_from(most).unwrap_or(i64::MAX);
-        let rows = query.query_map(params![kind, nanoseconds(until)?, most], |row| row.get(0))?;
-        Ok(rows.collect::<Result<_, _>>()?)
+        self.rows(query, params![kind, nanoseconds(until)?, most], |row| {
+            row.get(0)
+        })
     }
 
     /// Hands the JSON of every event of `kind` at a benchmark in a span of data time to `each`, oldest first.

@@ -6,7 +6,7 @@ use super::{Store, StoreError, access, timestamp};
 use crate::monitor::{Input, MemoryPart, Notice, Order, SearchFinding, Settings, from_bytes};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp};
 use rusqlite::types::ValueRef;
-use rusqlite::{Connection, params};
+use rusqlite::{Connection, Row, params};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -223,16 +223,10 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn counts_of_readings(&self) -> Result<BTreeMap<BenchmarkId, u64>, StoreError> {
-        let inner = self.inner();
-        let mut query = inner.connection.prepare_cached(
-            "SELECT name, (SELECT count(*) FROM step WHERE series = series.id) FROM series WHERE is_reading",
-        )?;
-        let rows = query.query_map([], |row| {
-            Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)?))
-        })?;
+        let query = "SELECT name, (SELECT count(*) FROM step WHERE series = series.id) FROM series
+             WHERE is_reading";
         let mut counts = BTreeMap::new();
-        for row in rows {
-            let (name, count) = row?;
+        for (name, count) in self.rows(query, [], name_and_count)? {
             *counts.entry(BenchmarkId::new(name)).or_default() += u64::try_from(count).unwrap_or(0);
         }
         Ok(counts)
@@ -243,14 +237,12 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn orders(&self) -> Result<Vec<LeftOrder>, StoreError> {
-        let inner = self.inner();
-        let mut query = inner
-            .connection
-            .prepare_cached("SELECT id, body FROM command ORDER BY id LIMIT ?1")?;
-        let rows = query.query_map([CHUNK], |row| Ok((row.get(0)?, row.get::<_, String>(1)?)))?;
+        let query = "SELECT id, body FROM command ORDER BY id LIMIT ?1";
+        let left = self.rows(query, [CHUNK], |row| {
+            Ok((row.get(0)?, row.get::<_, String>(1)?))
+        })?;
         let mut orders = Vec::new();
-        for row in rows {
-            let (number, body) = row?;
+        for (number, body) in left {
             let unreadable = |error: serde_json::Error| StoreError::Unreadable(error.to_string());
             let place: OrderPlace = serde_json::from_str(&body).map_err(unreadable)?;
             orders.push(LeftOrder {
@@ -290,16 +282,9 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn quarantined(&self) -> Result<BTreeMap<String, u64>, StoreError> {
-        let inner = self.inner();
-        let mut query = inner
-            .connection
-            .prepare_cached("SELECT name, value FROM meta WHERE name LIKE ?1 || '%'")?;
-        let rows = query.query_map([QUARANTINED], |row| {
-            Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)?))
-        })?;
+        let query = "SELECT name, value FROM meta WHERE name LIKE ?1 || '%'";
         let mut counts = BTreeMap::new();
-        for row in rows {
-            let (name, count) = row?;
+        for (name, count) in self.rows(query, [QUARANTINED], name_and_count)? {
             let source = name.strip_prefix(QUARANTINED).unwrap_or(&name).to_owned();
             counts.insert(source, u64::try_from(count).unwrap_or(0));
         }
@@ -342,20 +327,20 @@ impl Store {
         kind: Option<&str>,
         benchmark: Option<&str>,
     ) -> Result<Vec<(i64, String)>, StoreError> {
-        let inner = self.inner();
-        let mut query = inner.connection.prepare_cached(
-            "SELECT seq, body FROM event WHERE seq > ?1 AND (?2 IS NULL OR kind = ?2)
-             AND (?3 IS NULL OR benchmark = ?3) ORDER BY seq LIMIT ?4",
-        )?;
-        let rows = query.query_map(params![after, kind, benchmark, CHUNK], |row| {
+        let query = "SELECT seq, body FROM event WHERE seq > ?1 AND (?2 IS NULL OR kind = ?2)
+             AND (?3 IS NULL OR benchmark = ?3) ORDER BY seq LIMIT ?4";
+        self.rows(query, params![after, kind, benchmark, CHUNK], |row| {
             Ok((row.get(0)?, row.get(1)?))
-        })?;
-        Ok(rows.collect::<Result<_, _>>()?)
+        })
     }
 }
 
+fn name_and_count(row: &Row<'_>) -> rusqlite::Result<(String, i64)> {
+    Ok((row.get(0)?, row.get(1)?))
+}
+
 /// A name and what is kept under it; `None` where that is not what was written.
-fn named(row: &rusqlite::Row<'_>) -> Result<(String, Option<Vec<u8>>), StoreError> {
+fn named(row: &Row<'_>) -> Result<(String, Option<Vec<u8>>), StoreError> {
     let name: String = row.get(0)?;
     let sealed: Vec<u8> = row.get(1)?;
     let body = unseal(&[ValueRef::Text(name.as_bytes())], &sealed).map(<[u8]>::to_vec);

@@ -1,17 +1,20 @@
 //! The series that values belong to, by number.
 
 use super::StoreError;
-use super::sum::{is_whole, sum};
+use super::sum::{self, is_whole, sum};
 use crate::monitor::Measured;
 use crate::reading::{BenchmarkId, Unit};
 use jiff::SignedDuration;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Row, params};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Rows after a number, so many, each with its sum behind its values.
 pub(super) const ROWS: &str = "SELECT id, is_reading, name, unit, averaging, sum FROM series
      WHERE id > ?1 ORDER BY id LIMIT ?2";
+/// The columns of [`ROWS`] whose values the sum is over.
+const SUMMED: Range<usize> = 0..5;
 
 /// What values of one series have in common.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -162,22 +165,13 @@ impl Catalogue {
 
 /// Whether a row of [`ROWS`] is what was written.
 pub(super) fn is_as_written(row: &Row<'_>) -> rusqlite::Result<bool> {
-    is_whole(row, 0..5)
+    is_whole(row, SUMMED)
 }
 
 /// Gives each row its sum, taken for what was written.
 pub(super) fn seal_all(connection: &Connection) -> Result<(), StoreError> {
-    let mut query = connection.prepare(ROWS)?;
-    let mut rows = query.query([0, i64::MAX])?;
-    while let Some(row) = rows.next()? {
-        let number: i64 = row.get(0)?;
-        let values = (0..5).map(|index| row.get_ref(index));
-        let values: Vec<ValueRef<'_>> = values.collect::<Result<_, _>>()?;
-        connection
-            .prepare_cached("UPDATE series SET sum = ?2 WHERE id = ?1")?
-            .execute([number, sum(&values)])?;
-    }
-    Ok(())
+    let update = "UPDATE series SET sum = ?2 WHERE id = ?1";
+    sum::seal_all(connection, ROWS, &SUMMED, update)
 }
 
 pub(super) fn insert(
