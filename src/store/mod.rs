@@ -25,7 +25,7 @@ pub use batch::{Batch, Position};
 pub use evidence::{DeliveryRow, PlacedEvent};
 pub use known::Presence;
 pub use outbox::{AlertIdentity, Delivery, DeliveryOutcome};
-pub use past::{Heads, Value, Values};
+pub use past::{EARLIEST, Heads, LATEST, MOST_SHOWN, Value, Values};
 pub use read::{LeftOrder, Recorded, StepRow};
 pub use verify::Verified;
 

@@ -1,9 +1,17 @@
 //! What was known at a moment: the values taken and the events said until then.
 
 use super::{Store, StoreError, nanoseconds, timestamp};
-use crate::reading::{Quantity, Timestamp, Unit};
+use crate::reading::{BenchmarkId, Quantity, Reading, Series, Timestamp, Unit};
 use jiff::SignedDuration;
 use rusqlite::{Row, params};
+
+/// The earliest time that the state can hold.
+pub const EARLIEST: Timestamp = Timestamp::constant(-9_000_000_000, 0);
+/// The latest time that the state can hold.
+pub const LATEST: Timestamp = Timestamp::constant(9_000_000_000, 0);
+
+/// Values of one series that a page or a report reads at most, the newest.
+pub const MOST_SHOWN: usize = 200_000;
 
 /// A stretch of one benchmark's or covariate's values, as it was known at a moment.
 #[derive(Debug, Clone, Copy)]
@@ -166,6 +174,33 @@ impl Store {
         Ok(values)
     }
 
+    /// A stretch of a benchmark's readings in mm or mm/day; of two quantities the displacement. In mm where there are none.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn series(&self, wanted: &Values<'_>) -> Result<Series, StoreError> {
+        let values = self.values(wanted)?;
+        let is_displacement = |value: &Value| value.quantity == Some(Quantity::Displacement);
+        let has_displacement = values.iter().any(is_displacement);
+        let ours = (values.iter()).filter(|value| is_displacement(value) == has_displacement);
+        Ok(Series {
+            benchmark: BenchmarkId::new(wanted.name),
+            unit: if has_displacement || values.is_empty() {
+                Unit::MM
+            } else {
+                Unit::MM_PER_DAY
+            },
+            averaging: ours.clone().find_map(|value| value.averaging),
+            readings: ours
+                .map(|value| Reading {
+                    time: value.time,
+                    value: value.value,
+                    sigma: value.sigma,
+                })
+                .collect(),
+        })
+    }
+
     /// The JSON of the newest event of `kind` at a benchmark that was said at or before `until`.
     ///
     /// # Errors
@@ -256,7 +291,6 @@ fn value(row: &Row<'_>, is_reading: bool) -> Result<Value, StoreError> {
 mod tests {
     use super::*;
     use crate::monitor::Input;
-    use crate::reading::{BenchmarkId, Reading};
     use crate::store::Batch;
 
     fn at(second: i64) -> Timestamp {

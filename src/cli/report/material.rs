@@ -5,20 +5,13 @@ use crate::alert::Policy;
 use crate::cli::replay;
 use crate::config;
 use crate::monitor::{Event, Settings, by_time};
-use crate::reading::{
-    BenchmarkId, Channel, Quantity, Reading, Recording, Sample, Series, Timestamp, Unit,
-};
-use crate::store::{Store, Value, Values};
+use crate::reading::{Channel, Recording, Sample, Timestamp};
+use crate::store::{EARLIEST, LATEST, MOST_SHOWN, Store, Values};
 use anyhow::Context;
 use std::path::Path;
 
-/// Readings of one series at most, the newest.
-const MOST_READINGS: usize = 200_000;
 /// Before the stretch that is reported, its figures show so many times its length.
 const BEFORE: i32 = 4;
-/// What the state can hold.
-const EARLIEST: Timestamp = Timestamp::constant(-9_000_000_000, 0);
-const LATEST: Timestamp = Timestamp::constant(9_000_000_000, 0);
 
 /// All that a report says something about.
 #[derive(Debug)]
@@ -107,7 +100,10 @@ pub(super) fn of_state(args: &Args, file: &Path) -> anyhow::Result<Material> {
             .as_deref()
             .is_none_or(|one| one == id.as_str())
         {
-            recording.series.extend(series(&store, &id, drawn_from)?);
+            let series = store.series(&wanted(id.as_str(), true, drawn_from))?;
+            if !series.readings.is_empty() {
+                recording.series.push(series);
+            }
         }
     }
     for (name, unit) in store.channels()? {
@@ -152,37 +148,8 @@ fn wanted(name: &str, is_reading: bool, from: Timestamp) -> Values<'_> {
         from,
         to: LATEST,
         known: LATEST,
-        most: MOST_READINGS,
+        most: MOST_SHOWN,
     }
-}
-
-/// The benchmark's readings in mm or mm/day; of two quantities the displacement.
-fn series(store: &Store, id: &BenchmarkId, from: Timestamp) -> anyhow::Result<Option<Series>> {
-    let values = store.values(&wanted(id.as_str(), true, from))?;
-    let is_displacement = |value: &Value| value.quantity == Some(Quantity::Displacement);
-    let has_displacement = values.iter().any(is_displacement);
-    let ours = values
-        .iter()
-        .filter(|value| is_displacement(value) == has_displacement);
-    let readings: Vec<Reading> = ours
-        .clone()
-        .map(|value| Reading {
-            time: value.time,
-            value: value.value,
-            sigma: value.sigma,
-        })
-        .collect();
-    let unit = if has_displacement {
-        Unit::MM
-    } else {
-        Unit::MM_PER_DAY
-    };
-    Ok((!readings.is_empty()).then(|| Series {
-        benchmark: id.clone(),
-        unit,
-        averaging: ours.clone().find_map(|value| value.averaging),
-        readings,
-    }))
 }
 
 fn events(store: &Store) -> anyhow::Result<Vec<Event>> {

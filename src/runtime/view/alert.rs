@@ -9,7 +9,7 @@ use crate::runtime::clock;
 use crate::runtime::standing::{
     TakenOrders, every, first_call, in_force, is_acknowledgement, numbered,
 };
-use crate::store::{DeliveryRow, Store, StoreError};
+use crate::store::{DeliveryRow, LATEST, Store, StoreError};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -333,7 +333,7 @@ fn alarm_state(
 ) -> Result<AlarmState, StoreError> {
     let now = store.settings_at(store.last_step())?.unwrap_or_default();
     let alarms = Alarms::read(store, None, clock::now(), &now.declared)?;
-    let newest = refit(store, call.benchmark.as_ref(), super::LATEST)?;
+    let newest = refit(store, call.benchmark.as_ref(), LATEST)?;
     let called = newest.and_then(|event| {
         if let EventKind::Refit { called, .. } = event.kind {
             called
@@ -385,6 +385,6 @@ fn valid_until(
     if ended.is_some() || level == Level::Unknown {
         return Ok(ended);
     }
-    let newest = refit(store, benchmark, super::LATEST)?.map_or(since, |event| event.time);
+    let newest = refit(store, benchmark, LATEST)?.map_or(since, |event| event.time);
     Ok(newest.max(since).checked_add(policy.evacuation_time).ok())
 }

@@ -2,7 +2,7 @@
 
 use super::site::Standing;
 use super::thin::{self, ThinPoint};
-use super::{EARLIEST, LATEST, SiteReader, held, read};
+use super::{SiteReader, held, read};
 use crate::fit::{Observations, Rate, RateOptions};
 use crate::forecast::InverseVelocityLine;
 use crate::monitor::{
@@ -10,18 +10,15 @@ use crate::monitor::{
     levels_in, recent,
 };
 use crate::reading::{
-    BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
-    unix_seconds,
+    BenchmarkId, Quantity, SECONDS_PER_DAY, Series, Timestamp, days_since, unix_seconds,
 };
 use crate::runtime::alarm_state::Alarms;
 use crate::runtime::standing::{TakenOrders, in_force};
-use crate::store::{StoreError, Value, Values};
+use crate::store::{EARLIEST, LATEST, MOST_SHOWN, StoreError, Values};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 
-/// Readings that are looked at for one answer, the newest.
-const MOST_READINGS: usize = 200_000;
 /// Stretches of time of which each series keeps its extremes, at most.
 const MOST_BUCKETS: usize = 2000;
 const BUCKETS: usize = 400;
@@ -29,6 +26,7 @@ const BUCKETS: usize = 400;
 const VELOCITIES: usize = 400;
 /// Events of one kind that are listed, the newest.
 const MOST_EVENTS: usize = 300;
+
 /// What is asked for.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct TimeWindow {
@@ -185,8 +183,8 @@ impl SiteReader {
         let from = window.from.map_or(EARLIEST, held);
         let to = window.to.map_or(LATEST, held).min(known);
         let buckets = window.buckets.unwrap_or(BUCKETS).clamp(10, MOST_BUCKETS);
-        let all = self.series(&id, EARLIEST, known, known)?;
-        let is_cut = all.readings.len() >= MOST_READINGS;
+        let all = self.series(name, known)?;
+        let is_cut = all.readings.len() >= MOST_SHOWN;
         let shown = within(&all, from, to);
         let latest = self.store.event_at(name, "refit", known)?;
         let latest: Option<Event> = latest.as_deref().map(read).transpose()?;
@@ -233,40 +231,15 @@ impl SiteReader {
         }))
     }
 
-    /// The benchmark's readings in mm or mm/day; of two quantities the displacement.
-    fn series(
-        &self,
-        id: &BenchmarkId,
-        from: Timestamp,
-        to: Timestamp,
-        known: Timestamp,
-    ) -> Result<Series, StoreError> {
-        let values = self.store.values(&Values {
-            name: id.as_str(),
+    /// The benchmark's readings in mm or mm/day until `known`, as they were known then.
+    fn series(&self, name: &str, known: Timestamp) -> Result<Series, StoreError> {
+        self.store.series(&Values {
+            name,
             is_reading: true,
-            from,
-            to,
+            from: EARLIEST,
+            to: known,
             known,
-            most: MOST_READINGS,
-        })?;
-        let is_displacement = |value: &Value| value.quantity == Some(Quantity::Displacement);
-        let has_displacement = values.iter().any(is_displacement);
-        let ours = (values.iter()).filter(|value| is_displacement(value) == has_displacement);
-        Ok(Series {
-            benchmark: id.clone(),
-            unit: if has_displacement || values.is_empty() {
-                Unit::MM
-            } else {
-                Unit::MM_PER_DAY
-            },
-            averaging: ours.clone().find_map(|value| value.averaging),
-            readings: ours
-                .map(|value| Reading {
-                    time: value.time,
-                    value: value.value,
-                    sigma: value.sigma,
-                })
-                .collect(),
+            most: MOST_SHOWN,
         })
     }
 
@@ -285,7 +258,7 @@ impl SiteReader {
                 from,
                 to,
                 known,
-                most: MOST_READINGS,
+                most: MOST_SHOWN,
             })?;
             let points: Vec<ThinPoint> = samples
                 .iter()

@@ -18,14 +18,10 @@ use super::vitals::Vitals;
 use crate::config::{Config, Links};
 use crate::monitor::{Declared, SiteLevel, Watched};
 use crate::reading::{BenchmarkId, Timestamp};
-use crate::store::{Heads, Store, StoreError};
+use crate::store::{EARLIEST, Heads, LATEST, Store, StoreError};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, PoisonError, RwLock};
-
-/// The earliest and the latest time that the state can hold.
-const EARLIEST: Timestamp = Timestamp::constant(-9_000_000_000, 0);
-const LATEST: Timestamp = Timestamp::constant(9_000_000_000, 0);
 
 /// What time it is on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,12 +1,12 @@
 //! An order that was given on the page, and whether it is taken.
 
-use super::{EARLIEST, SiteReader};
+use super::SiteReader;
 use crate::config::EXERCISE;
 use crate::monitor::{EventKind, Given, Order, OrderedBy};
 use crate::reading::BenchmarkId;
 use crate::runtime::clock;
 use crate::runtime::standing::silence_of_the_site;
-use crate::store::StoreError;
+use crate::store::{EARLIEST, StoreError};
 use jiff::SignedDuration;
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -1,6 +1,6 @@
 //! The whole site at a moment: how each benchmark stands, what is in force, what was said last.
 
-use super::{LATEST, SiteReader, held, read};
+use super::{SiteReader, held, read};
 use crate::alert::Level;
 use crate::monitor::{CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -8,7 +8,7 @@ use crate::regime::Regime;
 use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::standing::{InForce, TakenOrders, in_force};
 use crate::runtime::vitals::VitalsPoint;
-use crate::store::StoreError;
+use crate::store::{LATEST, StoreError};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
