@@ -11,6 +11,7 @@ use super::coefficients::Coefficients;
 use super::law::{Law, LawError};
 use super::load::{Load, LoadStretch};
 use super::relaxation::Relaxation;
+use super::taylor::{PowerSeries, radius, unit_days};
 use super::trajectory::Motion;
 use std::ops::ControlFlow;
 
@@ -22,8 +23,6 @@ const MOST_STEPS: usize = 20_000;
 const LN_Y_OF_FAILURE: f64 = -37.0;
 /// Halvings that find a time inside a step to rounding.
 const HALVINGS: usize = 60;
-
-type PowerSeries = [f64; MAX_ORDER + 1];
 
 /// The law under a load.
 #[derive(Debug, Clone, Copy)]
@@ -45,16 +44,12 @@ struct BlockState {
     passed: usize,
 }
 
-/// One Taylor step: y and slip as polynomials in (t - start) / unit, f linear.
+/// One Taylor step: y and slip as polynomials, f linear.
 #[derive(Debug, Clone, Copy)]
 struct TaylorStep {
-    start: f64,
     end: f64,
-    unit: f64,
     stretch: LoadStretch,
-    order: usize,
-    y: PowerSeries,
-    slip: PowerSeries,
+    series: PowerSeries<{ MAX_ORDER + 1 }>,
     /// In place of the series, where the block stays beside a steady state.
     relaxation: Option<Relaxation>,
 }
@@ -104,7 +99,7 @@ impl<'a> LoadedLaw<'a> {
         while asked.next_if(|(t, _)| **t < 0.0).is_some() {}
         self.follow(times.last().copied().unwrap_or(0.0), |step| {
             while let Some((t, slot)) = asked.next_if(|(t, _)| **t < step.end) {
-                if *t >= step.start {
+                if *t >= step.series.start {
                     *slot = Some(self.motion(step, *t));
                 }
             }
@@ -191,10 +186,10 @@ impl<'a> LoadedLaw<'a> {
     /// When within the step the velocity first reaches `velocity`.
     fn passage(&self, step: &TaylorStep, velocity: f64) -> Option<f64> {
         let reaches = |t: f64| self.motion(step, t).velocity >= velocity;
-        if reaches(step.start) {
-            return Some(step.start);
+        if reaches(step.series.start) {
+            return Some(step.series.start);
         }
-        let top = if step.growth(step.start) > 0.0 && step.growth(step.end) < 0.0 {
+        let top = if step.growth(step.series.start) > 0.0 && step.growth(step.end) < 0.0 {
             first(step, |t| step.growth(t) <= 0.0)
         } else {
             step.end
@@ -207,7 +202,7 @@ impl<'a> LoadedLaw<'a> {
 
 /// The first time within the step at which what holds at its end holds.
 fn first(step: &TaylorStep, holds: impl Fn(f64) -> bool) -> f64 {
-    let (mut before, mut after) = (step.start, step.end);
+    let (mut before, mut after) = (step.series.start, step.end);
     for _ in 0..HALVINGS {
         let middle = f64::midpoint(before, after);
         if holds(middle) {
@@ -254,25 +249,28 @@ impl TaylorStep {
         }
         let radius = radius(&y, order).min(radius(&v, order));
         Self {
-            start: block.t,
             end: (block.t + fraction * radius * unit).min(stretch.until),
-            unit,
             stretch,
-            order,
-            y,
-            slip,
+            series: PowerSeries {
+                start: block.t,
+                unit,
+                order,
+                y,
+                slip,
+            },
             relaxation: None,
         }
     }
 
     /// The block at the end of the step.
     fn next(&self, law: &Law, block: &BlockState) -> Next {
-        let remaining = -self.y[0] / self.y[1] * self.unit;
+        let PowerSeries { start, unit, y, .. } = &self.series;
+        let remaining = -y[0] / y[1] * unit;
         // Elsewhere y^p grows without bound as y falls, and stops it.
         let can_fail = remaining > 0.0 && (law.a == 0.0 || (0.0..1.0).contains(&law.p));
-        let stands = self.end <= self.start;
-        if can_fail && (stands || self.y[0].ln() < LN_Y_OF_FAILURE) {
-            return Next::Failure(self.start + remaining);
+        let stands = self.end <= *start;
+        if can_fail && (stands || y[0].ln() < LN_Y_OF_FAILURE) {
+            return Next::Failure(start + remaining);
         }
         if stands {
             return Next::Lost;
@@ -290,7 +288,7 @@ impl TaylorStep {
     }
 
     fn log_load(&self, t: f64) -> f64 {
-        self.stretch.log_load + self.stretch.per_day * (t - self.start)
+        self.stretch.log_load + self.stretch.per_day * (t - self.series.start)
     }
 
     /// (y, `slip / v_i`) at time `t`.
@@ -299,13 +297,7 @@ impl TaylorStep {
             let (y, slip) = relaxation.at(t);
             return (y, slip * self.stretch.log_load.exp());
         }
-        let h = (t - self.start) / self.unit;
-        let (mut y, mut slip) = (self.y[self.order], self.slip[self.order]);
-        for k in (0..self.order).rev() {
-            y = y * h + self.y[k];
-            slip = slip * h + self.slip[k];
-        }
-        (y, slip)
+        self.series.at(t)
     }
 
     /// d ln v / dt times the step's unit: what the load adds, less what the contacts do. A relaxation
@@ -314,31 +306,20 @@ impl TaylorStep {
         if self.relaxation.is_some() {
             return 0.0;
         }
-        let h = (t - self.start) / self.unit;
+        let PowerSeries {
+            start,
+            unit,
+            order,
+            ref y,
+            ..
+        } = self.series;
+        let h = (t - start) / unit;
         let mut slope = 0.0;
-        for k in (1..=self.order).rev() {
-            slope = slope * h + k as f64 * self.y[k];
+        for k in (1..=order).rev() {
+            slope = slope * h + k as f64 * y[k];
         }
-        self.stretch.per_day * self.unit - slope / self.at(t).0
+        self.stretch.per_day * unit - slope / self.at(t).0
     }
-}
-
-/// Days in which the fastest of these rates (1/day) changes something by its own size.
-fn unit_days(rates: &[f64]) -> f64 {
-    let fastest = rates
-        .iter()
-        .fold(0.0, |most: f64, rate| most.max(rate.abs()));
-    if fastest > 0.0 && (1.0 / fastest).is_finite() {
-        1.0 / fastest
-    } else {
-        1.0
-    }
-}
-
-/// Estimates the radius of convergence from the two last coefficients.
-fn radius(c: &PowerSeries, order: usize) -> f64 {
-    let one = |k: usize| (c[0] / c[k]).abs().powf(1.0 / k as f64);
-    one(order).min(one(order - 1))
 }
 
 #[cfg(test)]

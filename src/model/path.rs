@@ -121,10 +121,10 @@ impl SolutionPath {
         }
         let index = self
             .segments
-            .partition_point(|segment| segment.start <= t)
+            .partition_point(|segment| segment.start() <= t)
             .saturating_sub(1);
         match self.segments.get(index) {
-            Some(segment) if t <= segment.start + segment.span * (1.0 + 1e-9) => {
+            Some(segment) if t <= segment.start() + segment.span * (1.0 + 1e-9) => {
                 let at = segment.at(t);
                 if at.0 > 0.0 {
                     PathPlace::At(at)

@@ -8,18 +8,38 @@ pub(super) const MAX_ORDER: usize = 30;
 /// The coefficients of one polynomial.
 pub(super) type TaylorSeries = [f64; MAX_ORDER + 1];
 
-/// y(t) and the slip over `v_i` from `start`, as polynomials in (t - start) / `unit`, good up to `span`.
+/// y(t) and the slip over `v_i` from `start`, as polynomials in (t - start) / `unit` of N coefficients at most.
 ///
-/// The unit is the law's own time there: in days the coefficients of a slope that takes 1e12 of them, or
+/// The unit, days, is the law's own time there: in days the coefficients of a slope that takes 1e12 of them, or
 /// 1e-13, leave the range of f64.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Segment {
+pub(super) struct PowerSeries<const N: usize> {
     pub(super) start: f64,
+    pub(super) unit: f64,
+    pub(super) order: usize,
+    pub(super) y: [f64; N],
+    pub(super) slip: [f64; N],
+}
+
+impl<const N: usize> PowerSeries<N> {
+    /// (y, `slip / v_i`) at time `t`.
+    pub(super) fn at(&self, t: f64) -> (f64, f64) {
+        let h = (t - self.start) / self.unit;
+        let mut y = self.y[self.order];
+        let mut slip = self.slip[self.order];
+        for k in (0..self.order).rev() {
+            y = y * h + self.y[k];
+            slip = slip * h + self.slip[k];
+        }
+        (y, slip)
+    }
+}
+
+/// The law about one time, good for `span` days from there on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Segment {
     pub(super) span: f64,
-    unit: f64,
-    order: usize,
-    y: TaylorSeries,
-    slip: TaylorSeries,
+    series: PowerSeries<{ MAX_ORDER + 1 }>,
 }
 
 impl Segment {
@@ -37,7 +57,7 @@ impl Segment {
         let ln_y = y_0.ln();
         let slope_per_day = law.slope_at_ln(ln_y);
         let k_per_day = law.kappa * (law.p * ln_y).exp();
-        let unit = unit_days(slope_per_day / y_0, k_per_day / y_0);
+        let unit = unit_days(&[slope_per_day / y_0, k_per_day / y_0]);
         let slope = slope_per_day * unit;
         let k_0 = k_per_day * unit;
         // Of slope p G + G K_0.
@@ -68,32 +88,31 @@ impl Segment {
         }
         let radius = radius(&y, order).min(radius(&u, order));
         Self {
-            start,
             span: radius * unit * step_fraction(order),
-            unit,
-            order,
-            y,
-            slip,
+            series: PowerSeries {
+                start,
+                unit,
+                order,
+                y,
+                slip,
+            },
         }
+    }
+
+    pub(super) fn start(&self) -> f64 {
+        self.series.start
     }
 
     /// (y, `slip / v_i`) at time `t`.
     pub(super) fn at(&self, t: f64) -> (f64, f64) {
-        let h = (t - self.start) / self.unit;
-        let mut y = self.y[self.order];
-        let mut slip = self.slip[self.order];
-        for k in (0..self.order).rev() {
-            y = y * h + self.y[k];
-            slip = slip * h + self.slip[k];
-        }
-        (y, slip)
+        self.series.at(t)
     }
 }
 
-/// Days in which y, or its slope, would change by its own size; 1 where they never do.
-fn unit_days(growth: f64, curvature: f64) -> f64 {
-    let fastest = growth.abs().max(curvature.abs());
-    let unit = 1.0 / fastest;
+/// Days in which the fastest of these rates, 1/day, changes something by its own size; 1 where none does.
+pub(super) fn unit_days(rates: &[f64]) -> f64 {
+    let sizes = rates.iter().map(|rate| rate.abs());
+    let unit = 1.0 / sizes.fold(0.0, f64::max);
     if unit.is_finite() && unit > 0.0 {
         unit
     } else {
@@ -116,7 +135,7 @@ fn square(g: &TaylorSeries, k: usize) -> f64 {
 }
 
 /// Estimates the radius of convergence from the two last coefficients.
-pub(super) fn radius(c: &TaylorSeries, order: usize) -> f64 {
+pub(super) fn radius<const N: usize>(c: &[f64; N], order: usize) -> f64 {
     let one = |k: usize| {
         let share = (c[0] / c[k]).abs();
         if c[k] == 0.0 {
