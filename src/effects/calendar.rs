@@ -1,6 +1,6 @@
 //! Columns that only say when a reading was made: no covariates.
 
-use crate::reading::{Channel, Timestamp, days_since};
+use crate::reading::{Channel, LineFit, Timestamp, days_since};
 use jiff::civil::DateTime;
 use jiff::tz::{Offset, TimeZone};
 use std::collections::BTreeSet;
@@ -51,12 +51,11 @@ fn is_straight(values: &[(Timestamp, f64)]) -> bool {
 
 /// Whether a straight line of the one by the other leaves less than this share of its variance; neither is constant then.
 pub(super) fn on_one_line(pairs: &[(f64, f64)], left: f64) -> bool {
-    let n = pairs.len() as f64;
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
-    let means = (mean(&|pair| pair.0), mean(&|pair| pair.1));
-    let own = mean(&|pair| (pair.0 - means.0).powi(2));
-    let theirs = mean(&|pair| (pair.1 - means.1).powi(2));
-    let both = mean(&|pair| (pair.0 - means.0) * (pair.1 - means.1));
+    let Some(line) = LineFit::through(pairs) else {
+        return false;
+    };
+    let of_one = |sum: f64| sum / line.weight;
+    let (own, theirs, both) = (of_one(line.xx), of_one(line.yy), of_one(line.xy));
     own * theirs > 0.0 && own * theirs - both * both < left * own * theirs
 }
 

@@ -4,6 +4,7 @@ use super::act::Act;
 use super::problem::Problem;
 use super::refit::Fitted;
 use super::term::Scratch;
+use crate::reading::LineFit;
 
 /// By which factor the velocity is higher where what enters the load through this term is one standard deviation higher, in the mean over
 /// the fitted time: the slope of the ln of the velocity with the term over that without it. `None` for what is no single column
@@ -37,16 +38,6 @@ pub(super) fn per_sd(
         .zip(&without)
         .map(|(with, without)| (with / without).ln());
     let pairs: Vec<(f64, f64)> = column.iter().copied().zip(ratio).take(fitted).collect();
-    let factor = slope(&pairs)?.exp();
+    let factor = LineFit::through(&pairs)?.slope().exp();
     factor.is_finite().then_some(factor)
-}
-
-/// Of the second number over the first, by least squares.
-fn slope(pairs: &[(f64, f64)]) -> Option<f64> {
-    let count = pairs.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
-    let (x, y) = (mean(|pair| pair.0), mean(|pair| pair.1));
-    let square: f64 = pairs.iter().map(|pair| (pair.0 - x).powi(2)).sum();
-    let product: f64 = pairs.iter().map(|pair| (pair.0 - x) * (pair.1 - y)).sum();
-    (square > 0.0).then(|| product / square)
 }

@@ -1,6 +1,7 @@
 //! The straight line through inverse velocity, as practitioners draw it (Fukuzono 1985).
 
 use crate::fit::Rate;
+use crate::reading::LineFit;
 
 /// Ordinary least squares of 1/v against time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,49 +15,11 @@ pub struct InverseVelocityLine {
 }
 
 /// Fewer points than this make no line.
-const FEWEST: usize = 4;
+const FEWEST_POINTS: usize = 4;
 /// The line is not followed below this share of its mean.
 const NEARLY_ZERO: f64 = 0.02;
 /// Two lines that meet zero within this, days, are one.
 const SAME_DAYS: f64 = 0.01;
-
-/// Sums of squares and products about the means of (days, inverse velocity) points.
-struct Moments {
-    mean_t: f64,
-    mean_y: f64,
-    tt: f64,
-    ty: f64,
-    yy: f64,
-}
-
-impl Moments {
-    /// `None` under four points, or where all stand at one time.
-    fn of(points: &[(f64, f64)]) -> Option<Self> {
-        if points.len() < FEWEST {
-            return None;
-        }
-        let n = points.len() as f64;
-        let mean_t = points.iter().map(|(t, _)| t).sum::<f64>() / n;
-        let mean_y = points.iter().map(|(_, y)| y).sum::<f64>() / n;
-        let (mut tt, mut ty, mut yy) = (0.0, 0.0, 0.0);
-        for (t, y) in points {
-            tt += (t - mean_t) * (t - mean_t);
-            ty += (t - mean_t) * (y - mean_y);
-            yy += (y - mean_y) * (y - mean_y);
-        }
-        (tt > 0.0).then_some(Self {
-            mean_t,
-            mean_y,
-            tt,
-            ty,
-            yy,
-        })
-    }
-
-    fn slope(&self) -> f64 {
-        self.ty / self.tt
-    }
-}
 
 impl InverseVelocityLine {
     /// The line through the rates that move forward and stand clear of their noise; `None` under four.
@@ -67,10 +30,8 @@ impl InverseVelocityLine {
     /// One over the days from `now_days` to where the line meets zero: the rate at which it falls over what is left of
     /// it, without a break where it is level, and below 0 where it rises. `None` under four rates that move.
     pub(super) fn approach(rates: &[Rate], now_days: f64) -> Option<f64> {
-        let line = Moments::of(&Self::points(rates))?;
-        let slope = line.slope();
-        let left = line.mean_y + slope * (now_days - line.mean_t);
-        Some(-slope / left.max(NEARLY_ZERO * line.mean_y))
+        let line = through_enough(&Self::points(rates))?;
+        Some(-line.slope() / line.at(now_days).max(NEARLY_ZERO * line.mean_y))
     }
 
     /// (days, inverse velocity) of the rates that it takes.
@@ -95,19 +56,19 @@ impl InverseVelocityLine {
             return None;
         }
         // A line of least squares goes through the mean of its points.
-        let Moments { mean_t, mean_y, .. } = Moments::of(&points)?;
+        let line = through_enough(&points)?;
         let oldest = points.first()?.0;
-        let height = mean_y * (zero_days - oldest) / (zero_days - mean_t);
+        let height = line.mean_y * (zero_days - oldest) / (zero_days - line.mean_x);
         Some([(oldest, height), (zero_days, 0.0)])
     }
 
     /// The line through (days, inverse velocity) points; `None` under four.
     pub fn through(points: &[(f64, f64)]) -> Option<Self> {
-        let line = Moments::of(points)?;
+        let line = through_enough(points)?;
         let slope = line.slope();
-        let intercept_days = (slope < 0.0).then(|| line.mean_t - line.mean_y / slope);
+        let intercept_days = (slope < 0.0).then(|| line.reaches(0.0));
         let r_squared = if line.yy > 0.0 {
-            line.ty * line.ty / (line.tt * line.yy)
+            line.xy * line.xy / (line.xx * line.yy)
         } else {
             0.0
         };
@@ -119,6 +80,14 @@ impl InverseVelocityLine {
             falls_by_errors: -slope.signum() * (freedom * r_squared / scatter).sqrt(),
         })
     }
+}
+
+/// Of inverse velocity by days; `None` under four points, or where all stand at one time.
+fn through_enough(points: &[(f64, f64)]) -> Option<LineFit> {
+    if points.len() < FEWEST_POINTS {
+        return None;
+    }
+    LineFit::through(points)
 }
 
 #[cfg(test)]

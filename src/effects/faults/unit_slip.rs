@@ -2,6 +2,7 @@
 
 use super::trace::{Trace, resolution};
 use crate::effects::quantiles::median;
+use crate::reading::LineFit;
 
 /// Between mm, cm, m and km, and between them and inches and feet.
 const TIMES: [f64; 5] = [10.0, 100.0, 1000.0, 25.4, 304.8];
@@ -47,22 +48,16 @@ impl SideLine {
         if points.len() < FEWEST {
             return None;
         }
-        let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
-        let (t, y) = (mean(|point| point.0), mean(|point| point.1));
-        let squares: f64 = points.iter().map(|point| (point.0 - t).powi(2)).sum();
-        let products: f64 = points
-            .iter()
-            .map(|point| (point.0 - t) * (point.1 - y))
-            .sum();
-        let slope = products / squares;
+        let line = LineFit::through(points)?;
+        let (t, y, slope) = (line.mean_x, line.mean_y, line.slope());
         let off = |point: &(f64, f64)| point.1 - y - slope * (point.0 - t);
         let left: f64 = points.iter().map(|point| off(point).powi(2)).sum();
         let scatter = (left / (n - 2.0)).sqrt();
-        (squares > 0.0).then(|| Self {
+        Some(Self {
             level: y - slope * t,
-            level_error: scatter * (1.0 / n + t * t / squares).sqrt(),
+            level_error: scatter * (1.0 / n + t * t / line.xx).sqrt(),
             slope,
-            slope_error: scatter / squares.sqrt(),
+            slope_error: scatter / line.xx.sqrt(),
             scatter,
         })
     }

@@ -4,7 +4,7 @@
 //!
 //! The threshold is the critical velocity of the site; the line through ln v goes through the whole record.
 
-use super::straight::Straight;
+use super::straight::line_through;
 use super::{moves, point, rates};
 use crate::forecast::Passage;
 use crate::score::Known;
@@ -17,8 +17,8 @@ pub(in crate::score) fn forecast(known: &Known) -> Option<Passage> {
         .filter(|rate| moves(rate))
         .map(|rate| (rate.middle(), rate.velocity.ln(), 1.0))
         .collect();
-    let line = Straight::through(&points)?;
-    if line.slope <= 0.0 {
+    let line = line_through(&points)?;
+    if line.slope() <= 0.0 {
         return Some(Passage::default());
     }
     point(line.reaches(known.critical_mm_per_day.ln()) - known.now_days)

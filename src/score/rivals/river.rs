@@ -7,7 +7,7 @@
 //! moved at low water, by itself, counts most; and the share is a multiple of the flow's departure from its mean, by
 //! least squares of the changes from velocity to velocity, in which a trend all but vanishes.
 
-use super::straight::Straight;
+use super::straight::line_through;
 use super::{line, moves, point, rates};
 use crate::fit::Rate;
 use crate::forecast::{InverseVelocityLine, Passage};
@@ -24,8 +24,8 @@ pub(in crate::score) fn weighted_line(known: &Known) -> Option<Passage> {
         .filter(|(rate, _)| moves(rate))
         .map(|(rate, flow)| (rate.middle(), 1.0 / rate.velocity, weight(*flow, median)))
         .collect();
-    let line = Straight::through(&points)?;
-    if line.slope >= 0.0 {
+    let line = line_through(&points)?;
+    if line.slope() >= 0.0 {
         return Some(Passage::default());
     }
     point(line.reaches(0.0) - known.now_days)
@@ -65,7 +65,7 @@ fn share(beside: &[(Rate, f64)]) -> f64 {
             )
         })
         .collect();
-    Straight::through(&changes).map_or(0.0, |line| line.slope.max(0.0))
+    line_through(&changes).map_or(0.0, |line| line.slope().max(0.0))
 }
 
 /// Every rate with the mean flow during it, or the newest before where none was read within; without the

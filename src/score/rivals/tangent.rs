@@ -9,7 +9,7 @@
 //! is ours. Uniform creep is the velocity that was exceeded for half of the time until now.
 
 use super::onset::LONG;
-use super::straight::Straight;
+use super::straight::line_through;
 use super::{point, rates};
 use crate::fit::Rate;
 use crate::forecast::Passage;
@@ -31,8 +31,8 @@ pub(in crate::score) fn forecast(known: &Known) -> Option<Passage> {
     if angle >= IMMINENT_DEGREES {
         return point(0.0);
     }
-    let line = Straight::through(&angles)?;
-    if angle <= UNIFORM_DEGREES || line.slope <= 0.0 {
+    let line = line_through(&angles)?;
+    if angle <= UNIFORM_DEGREES || line.slope() <= 0.0 {
         return Some(Passage::default());
     }
     point(line.reaches(IMMINENT_DEGREES) - known.now_days)

@@ -4,7 +4,7 @@ use super::recorded::{decimal_year, velocities};
 use anyhow::{Context, Result};
 use slipwatch::fit::ConstantLoad;
 use slipwatch::model::{Accuracy, Trajectory};
-use slipwatch::reading::{Channel, Reading, Series, days_since};
+use slipwatch::reading::{Channel, LineFit, Reading, Series, days_since};
 use std::ops::Range;
 
 /// Days over which the flow is smoothed, exponentially.
@@ -111,9 +111,7 @@ fn centred(pairs: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 fn gain(pairs: &[(f64, f64)]) -> Option<f64> {
-    let pairs = centred(pairs);
-    let variance: f64 = pairs.iter().map(|(x, _)| x * x).sum();
-    (variance > 0.0).then(|| pairs.iter().map(|(x, y)| x * y).sum::<f64>() / variance)
+    LineFit::through(pairs).map(|line| line.slope())
 }
 
 fn explained(pairs: &[(f64, f64)], gain: f64) -> Option<f64> {
