@@ -89,6 +89,12 @@ pub struct Effect {
     pub at_interval: Option<[Timestamp; 2]>,
     /// How large: of an offset in `unit`, of a step the log-load, of a reset the state's factor, and so on.
     pub size: Option<f64>,
+    /// Bounds of the 90 % interval (5 and 95 %) of the `size` of what happened at a time, in its unit, that time and the delays of covariates held; null
+    /// where the readings leave it open.
+    pub size_interval: Option<[f64; 2]>,
+    /// By which factor the velocity is higher since it happened in the ground than it would be without it, in the mean (of its ln) over the fitted
+    /// readings since: the law's state answers as well. Null where the law without it fails within the record.
+    pub velocity_factor: Option<f64>,
     /// The unit of `size`, and of `gain_per_sd` of what acts in the reading; null for a pure number.
     pub unit: Option<String>,
     /// The groups into which the benchmarks parted.
@@ -116,6 +122,8 @@ impl Effect {
             at: None,
             at_interval: None,
             size: None,
+            size_interval: None,
+            velocity_factor: None,
             unit: None,
             groups: None,
             bic_gain: 0.0,

@@ -21,6 +21,36 @@ pub(super) fn per_sd(
     let [column] = columns.as_slice() else {
         return None;
     };
+    let ratios = ln_ratios(problem, full, index, scratch)?;
+    let pairs: Vec<(f64, f64)> = column.iter().copied().zip(ratios).collect();
+    let factor = LineFit::through(&pairs)?.slope().exp();
+    factor.is_finite().then_some(factor)
+}
+
+/// By which factor the velocity is higher since the event of that index than it would be without it: e to the mean of the ln over the fitted time
+/// since. `None` for what is no event of the ground, and where the law without it fails within the record.
+pub(super) fn since_event(
+    problem: &Problem,
+    full: &Fitted,
+    index: usize,
+    scratch: &mut Scratch,
+) -> Option<f64> {
+    let term = &full.terms[index];
+    let at = term.at.filter(|_| term.kind.is_event_of_the_ground())?;
+    let ratios = ln_ratios(problem, full, index, scratch)?;
+    let since = ratios.get(*problem.node_of.get(at)?..)?;
+    let factor = (since.iter().sum::<f64>() / since.len() as f64).exp();
+    factor.is_finite().then_some(factor)
+}
+
+/// ln of the velocity with the term of that index over that without it, by node of the fitted time; `None` where the law without it fails
+/// within the record.
+fn ln_ratios(
+    problem: &Problem,
+    full: &Fitted,
+    index: usize,
+    scratch: &mut Scratch,
+) -> Option<Vec<f64>> {
     let without = full.parameters_without(problem, index);
     let mut velocities = |parameters: &[f64]| {
         let goes_on = scratch.predict(problem, &full.terms, parameters);
@@ -33,11 +63,7 @@ pub(super) fn per_sd(
         .iter()
         .take_while(|node| **node <= last)
         .count();
-    let ratio = with
-        .iter()
-        .zip(&without)
-        .map(|(with, without)| (with / without).ln());
-    let pairs: Vec<(f64, f64)> = column.iter().copied().zip(ratio).take(fitted).collect();
-    let factor = LineFit::through(&pairs)?.slope().exp();
-    factor.is_finite().then_some(factor)
+    let ratios = with.iter().zip(&without);
+    let ratios = ratios.map(|(with, without)| (with / without).ln());
+    Some(ratios.take(fitted).collect())
 }

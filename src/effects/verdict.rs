@@ -376,7 +376,19 @@ pub(super) fn effect(
         said.velocity_factor_per_sd = velocity_factor::per_sd(problem, full, index, scratch);
         said.gain_interval = bounds.map(|bounds| bounds.map(|bound| bound / scale));
     }
+    if term.at.is_some() && said.size.is_some() {
+        let bounds = gain_interval::interval(ready, full, index, scratch);
+        said.size_interval = bounds.and_then(|bounds| sizes(ready, term, bounds));
+        said.velocity_factor = velocity_factor::since_event(problem, full, index, scratch);
+    }
     said
+}
+
+/// What the bounds of an event's one coefficient are as its size, the lower first.
+fn sizes(ready: &Ready, term: &Term, bounds: [f64; 2]) -> Option<[f64; 2]> {
+    let [one, other] = bounds.map(|bound| size(ready, term, &[bound]).size);
+    let (one, other) = (one?, other?);
+    Some([one.min(other), one.max(other)])
 }
 
 /// Gain, size, period, as the kind has them.

@@ -240,6 +240,22 @@ impl History {
         })
     }
 
+    /// Takes out the newest reading: as it was read, in the science's unit.
+    pub(super) fn take_out_newest(&mut self) -> Option<Reading> {
+        let newest = self.observations.values.pop()?;
+        Some(Reading {
+            time: self.time(newest.t_days)?,
+            value: newest.value + self.taken_off(newest.t_days),
+            sigma: newest.sigma,
+        })
+    }
+
+    /// The value of a reading, in the science's unit, as the record would have it.
+    pub(super) fn value_of(&self, source: MeasuredAs, reading: &Reading) -> f64 {
+        let own = self.observation(source, reading);
+        own.value - self.taken_off(own.t_days)
+    }
+
     /// When the newest reading was taken.
     pub(super) fn newest(&self) -> Option<Timestamp> {
         self.time(self.observations.values.last()?.t_days)

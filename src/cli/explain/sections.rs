@@ -134,7 +134,7 @@ fn effects(explanation: &Explanation) -> Option<TextTable> {
     let names = accepted.iter().map(|effect| effect.effect.to_string());
     let mut table = TextTable::headed([String::new()].into_iter().chain(names));
     let adds = format!("adds to the readings, rms {}", explanation.unit);
-    let rows: [(&str, PageCell); 14] = [
+    let rows: [(&str, PageCell); 16] = [
         ("channel", |effect| {
             effect.channel.clone().unwrap_or_else(dash)
         }),
@@ -149,13 +149,16 @@ fn effects(explanation: &Explanation) -> Option<TextTable> {
         ("size", |effect| {
             with_unit(effect.size, effect.unit.as_deref())
         }),
+        ("size, 5 to 95 %", |effect| interval(effect.size_interval)),
+        ("velocity factor since", |effect| {
+            number(effect.velocity_factor)
+        }),
         ("velocity factor per sd", |effect| {
             number(effect.velocity_factor_per_sd)
         }),
         ("log-load per sd", |effect| number(effect.gain_per_sd)),
         ("log-load per sd, 5 to 95 %", |effect| {
-            let bounds = effect.gain_interval;
-            bounds.map_or_else(dash, |bounds| bounds.map(brief).join(" to "))
+            interval(effect.gain_interval)
         }),
         ("mean delay, days", |effect| number(effect.lag_days)),
         ("95 % of the response, days", |effect| {
@@ -176,6 +179,10 @@ fn effects(explanation: &Explanation) -> Option<TextTable> {
     let gains = accepted.iter().map(|effect| gain(effect.bic_gain));
     table.row(["BIC gain".to_owned()].into_iter().chain(gains));
     Some(table)
+}
+
+fn interval(bounds: Option<[f64; 2]>) -> String {
+    bounds.map_or_else(dash, |bounds| bounds.map(brief).join(" to "))
 }
 
 fn is_an_effect(effect: &Effect) -> bool {

@@ -115,13 +115,12 @@ impl Track {
         context: &StepContext<'_>,
     ) -> Vec<Event> {
         let now = context.phase.now;
-        let mut events =
-            if let Some((source, waited)) = self.record.take_confirmed(reading.time, now) {
-                self.take_one(policy, source, &waited, context)
-            } else {
-                let contradicted = self.record.contradict_ahead(reading.time);
-                contradicted.into_iter().collect()
-            };
+        let mut events = Vec::from_iter(self.record.leave_out_overtaken(source, reading));
+        if let Some((source, waited)) = self.record.take_confirmed(reading.time, now) {
+            events.extend(self.take_one(policy, source, &waited, context));
+        } else {
+            events.extend(self.record.contradict_ahead(reading.time));
+        }
         events.extend(self.take_one(policy, source, reading, context));
         self.forecaster.forget_prepared();
         self.pending.hold_back(&mut events);
@@ -166,6 +165,9 @@ impl Track {
             Taken::Late | Taken::Corrected(_) => {
                 let levels = self.alarm.levels();
                 self.pending.note_late(reading.time, before, levels);
+                if taken == Taken::Late {
+                    events.extend(self.record.put_overtaken_aside(reading.time));
+                }
             }
         }
         events.extend(self.quality.count_own(&self.record, reading.time));

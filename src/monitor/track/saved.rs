@@ -7,7 +7,7 @@ use super::alarm::{Alarm, Levels, Occurrences, Overdue};
 use super::forecaster::{Adopted, Forecaster, Pace, Watch};
 use super::pending::{Lookback, PastReview, Pending};
 use super::quality::{DataQuality, Unknown};
-use super::record::{BenchmarkRecord, HeldReading};
+use super::record::{BenchmarkRecord, HeldReading, LateRun};
 use super::refit::FitChanges;
 use crate::alert::{AlertCause, Held, Latch};
 use crate::forecast::LawForecaster;
@@ -33,6 +33,8 @@ pub(super) struct SavedTrack {
     declared: Declarations,
     #[serde(default)]
     ahead: Option<HeldReading>,
+    #[serde(default)]
+    late_run: LateRun,
     #[serde(default)]
     dropped: u32,
 
@@ -93,7 +95,8 @@ impl From<SavedTrack> for Track {
                 saved.declared,
                 saved.ahead,
                 saved.dropped,
-            ),
+            )
+            .with_late_run(saved.late_run),
             quality: DataQuality::from_saved(
                 saved.unknown,
                 saved.spoilt_by,

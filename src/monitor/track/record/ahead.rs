@@ -1,5 +1,5 @@
-//! A reading that lies far ahead of all others waits until another one confirms it: with one wrong time stamp all that
-//! comes before that time would be late.
+//! A reading that lies far ahead of all others, or that others of the time before it overtake, waits until another one confirms it: with one
+//! wrong time stamp all that comes before that time would be late, and nothing would be judged by it.
 
 use super::BenchmarkRecord;
 use crate::monitor::event::Event;
@@ -10,6 +10,10 @@ use serde::{Deserialize, Serialize};
 
 /// So many readings of the time before it, one after the other, say that it was wrong.
 const CONTRADICTED: u32 = 3;
+/// The newest reading waits where it lies further than this after the last of as many that have come since; a little out of order is usual.
+const OVERTAKEN: SignedDuration = SignedDuration::from_mins(10);
+/// It is taken after all where its value lies among so many of the newest, or no farther from them than they range over.
+const LIKE: usize = 8;
 
 /// The reading that waits.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -22,6 +26,38 @@ pub(in crate::monitor::track) struct HeldReading {
     /// Whether it was the very first of its benchmark: data time went by it, and says nothing of it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     was_first: bool,
+    /// Whether it was taken as the newest before others of the time before it came.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    was_newest: bool,
+}
+
+/// The readings that have come since the newest one, each after the one before it, all between that and the one which was the newest before it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(in crate::monitor::track) struct LateRun {
+    /// When the newest but one was.
+    before: Option<Timestamp>,
+    last: Option<Timestamp>,
+    count: u32,
+}
+
+impl LateRun {
+    /// Nothing has come since the newest reading, before which that of `before` was the newest.
+    pub(super) fn after(before: Option<Timestamp>) -> Self {
+        Self {
+            before,
+            ..Self::default()
+        }
+    }
+
+    /// A reading of `time` has come late.
+    fn note(&mut self, time: Timestamp) {
+        if self.before.is_none_or(|before| time <= before) {
+            return;
+        }
+        let goes_on = self.last.is_none_or(|last| time > last);
+        self.count = if goes_on { self.count + 1 } else { 1 };
+        self.last = Some(time);
+    }
 }
 
 impl HeldReading {
@@ -53,8 +89,72 @@ impl BenchmarkRecord {
             reading: *reading,
             before: 0,
             was_first: false,
+            was_newest: false,
         });
         self.fault(now, "leaps-ahead", text)
+    }
+
+    /// After a reading of `time` that came late: where several have come so, one after the other, the newest one waits from now on.
+    pub(in crate::monitor::track) fn put_overtaken_aside(
+        &mut self,
+        time: Timestamp,
+    ) -> Option<Event> {
+        self.late_run.note(time);
+        let newest = self.newest?;
+        let is_overtaken = self.late_run.count >= CONTRADICTED
+            && newest.duration_since(time) > OVERTAKEN
+            && self.ahead.is_none();
+        // A sensor's repeats are not in the record.
+        if !is_overtaken || self.history.newest() != Some(newest) {
+            return None;
+        }
+        let source = self.source();
+        let reading = self.history.take_out_newest()?;
+        let text = format!(
+            "benchmark {}: the reading of {newest} waits: {CONTRADICTED} of the time before it have come since, one after the other; it counts \
+             once a later one confirms it",
+            self.benchmark,
+        );
+        self.ahead = Some(HeldReading {
+            unit: source.unit,
+            averaging: source.averaging,
+            reading,
+            before: 0,
+            was_first: false,
+            was_newest: true,
+        });
+        self.late_run = LateRun::default();
+        // Data time does not go back: what follows from readings of before it has its time until one comes after it.
+        Some(self.fault(newest, "leaps-ahead", text))
+    }
+
+    /// The reading that others overtook, where `reading` comes after it and its value is none of that time: it is left out.
+    pub(in crate::monitor::track) fn leave_out_overtaken(
+        &mut self,
+        source: MeasuredAs,
+        reading: &Reading,
+    ) -> Option<Event> {
+        let ahead = self.ahead.as_ref()?;
+        let own = MeasuredAs {
+            unit: ahead.unit,
+            averaging: ahead.averaging,
+        };
+        let value = self.history.value_of(own, &ahead.reading);
+        let recent = self.history.values_as_read(ahead.unit, LIKE);
+        let beside = || {
+            let newest = self.history.value_of(source, reading);
+            recent.iter().copied().chain([newest])
+        };
+        let low = beside().fold(f64::INFINITY, f64::min);
+        let high = beside().fold(f64::NEG_INFINITY, f64::max);
+        let is_like = (low - (high - low)..=high + (high - low)).contains(&value);
+        let is_wrong = ahead.was_newest && reading.time >= ahead.reading.time && !is_like;
+        let wrong = self.ahead.take_if(|_| is_wrong)?;
+        let text = format!(
+            "benchmark {}: the reading of {} is left out: others of the time before it came after it, and its value is not theirs",
+            self.benchmark, wrong.reading.time
+        );
+        Some(self.fault(reading.time, "leapt-ahead", text))
     }
 
     /// When the only reading that there is was measured, where one of `time`, which comes after it, lies as far before it as one lies
@@ -86,6 +186,7 @@ impl BenchmarkRecord {
             reading,
             before: 0,
             was_first: true,
+            was_newest: false,
         });
         self.newest = None;
         self.silence.begin_again();
@@ -99,7 +200,8 @@ impl BenchmarkRecord {
         now: Timestamp,
     ) -> Option<(MeasuredAs, Reading)> {
         let ahead = (self.ahead).take_if(|ahead| {
-            let has_come = !ahead.was_first && now >= ahead.reading.time;
+            let moved_data_time = ahead.was_first || ahead.was_newest;
+            let has_come = !moved_data_time && now >= ahead.reading.time;
             time >= ahead.reading.time || has_come
         })?;
         let source = MeasuredAs {
@@ -112,7 +214,7 @@ impl BenchmarkRecord {
     /// A reading of `time` has come, before the one that waits: that one waits on, or was wrong.
     pub(in crate::monitor::track) fn contradict_ahead(&mut self, time: Timestamp) -> Option<Event> {
         let is_newer = self.newest.is_some_and(|newest| time > newest);
-        let ahead = self.ahead.as_mut()?;
+        let ahead = self.ahead.as_mut().filter(|ahead| !ahead.was_newest)?;
         ahead.before += u32::from(is_newer);
         let wrong = self.ahead.take_if(|ahead| ahead.before >= CONTRADICTED)?;
         let text = format!(
@@ -126,6 +228,62 @@ impl BenchmarkRecord {
 #[cfg(test)]
 mod tests {
     use crate::monitor::track::fixture::{DISPLACEMENT, at, reading, record};
+    use crate::monitor::track::record::BenchmarkRecord;
+
+    /// Readings each hour, one of hour 20 among them, and then as many of the time before it.
+    fn overtaken(values: [f64; 3]) -> BenchmarkRecord {
+        let mut record = record([0.0, 1.0, 2.0]);
+        record.take(DISPLACEMENT, &reading(20, 2.5));
+        record.note_newest(at(20));
+        let said: Vec<bool> = (3..)
+            .zip(values)
+            .map(|(hour, value)| {
+                record.take(DISPLACEMENT, &reading(hour, value));
+                record.put_overtaken_aside(at(hour)).is_some()
+            })
+            .collect();
+        assert_eq!(said, [false, false, true]);
+        record
+    }
+
+    #[test]
+    fn the_newest_reading_waits_where_others_overtake_it_and_is_taken_where_it_goes_on_from_them() {
+        let mut first_sent = overtaken([2.1, 2.2, 2.3]);
+        assert_eq!(first_sent.history().newest(), Some(at(5)));
+        assert_eq!(first_sent.data_time(at(6)), at(20));
+        assert!(first_sent.contradict_ahead(at(6)).is_none());
+        assert!(first_sent.take_confirmed(at(6), at(20)).is_none());
+        let last = reading(21, 2.6);
+        assert!(
+            first_sent
+                .leave_out_overtaken(DISPLACEMENT, &last)
+                .is_none()
+        );
+        let (_, taken) = first_sent.take_confirmed(at(21), at(21)).unwrap();
+        assert_eq!(taken, reading(20, 2.5));
+
+        let mut wrong = overtaken([50.0, 60.0, 70.0]);
+        for hour in 6..14 {
+            wrong.take(DISPLACEMENT, &reading(hour, 20.0 + 10.0 * f64::from(hour)));
+            wrong.note_newest(at(hour));
+        }
+        let before = reading(14, 400.0);
+        assert!(wrong.leave_out_overtaken(DISPLACEMENT, &before).is_none());
+        let last = reading(21, 500.0);
+        assert!(wrong.leave_out_overtaken(DISPLACEMENT, &last).is_some());
+        assert!(wrong.take_confirmed(at(21), at(21)).is_none());
+    }
+
+    #[test]
+    fn what_comes_out_of_order_overtakes_nothing() {
+        let mut record = record([0.0, 1.0, 2.0]);
+        record.take(DISPLACEMENT, &reading(20, 2.5));
+        record.note_newest(at(20));
+        // A file written backwards, and what fills a gap of long before.
+        for hour in [19, 18, 17, 16, 1, 2] {
+            assert!(record.put_overtaken_aside(at(hour)).is_none(), "{hour}");
+        }
+    }
 
     #[test]
     fn a_first_reading_far_ahead_waits_as_any_other_does() {

@@ -13,7 +13,7 @@ use crate::reading::{BenchmarkId, Quantity, Reading, Timestamp, Unit, days_of};
 use jiff::SignedDuration;
 use serde::Serialize;
 
-pub(super) use ahead::HeldReading;
+pub(super) use ahead::{HeldReading, LateRun};
 
 /// A reading leaps ahead in time when it lies further than this after the one before,
 const LEAST_LEAP: SignedDuration = SignedDuration::from_hours(48);
@@ -31,6 +31,7 @@ pub(super) struct BenchmarkRecord {
     declared: Declarations,
     /// A reading that lies far ahead of all others.
     ahead: Option<HeldReading>,
+    late_run: LateRun,
     /// How often what was known of the benchmark has been dropped before.
     #[serde(skip_serializing_if = "was_never_dropped")]
     dropped: u32,
@@ -56,6 +57,7 @@ impl BenchmarkRecord {
             newest: None,
             declared,
             ahead: None,
+            late_run: LateRun::default(),
             dropped,
         }
     }
@@ -76,8 +78,14 @@ impl BenchmarkRecord {
             newest,
             declared,
             ahead,
+            late_run: LateRun::default(),
             dropped,
         }
+    }
+
+    /// The same with what has come since its newest reading.
+    pub(super) fn with_late_run(self, late_run: LateRun) -> Self {
+        Self { late_run, ..self }
     }
 
     pub(super) fn benchmark(&self) -> &BenchmarkId {
@@ -126,9 +134,10 @@ impl BenchmarkRecord {
         self.history.take(source, reading)
     }
 
-    /// The reading of `time` is the newest.
+    /// The reading of `time` is the newest, but for one that waits.
     pub(super) fn note_newest(&mut self, time: Timestamp) {
-        self.newest = Some(time);
+        self.late_run = LateRun::after(self.newest);
+        self.newest = Some(self.data_time(time));
     }
 
     /// Of so many newest readings, that say nothing, only the first is left.
