@@ -1,7 +1,7 @@
 //! `check`: the site file and what it names on this machine, without starting anything.
 
 use super::{
-    Config, ConfigError, DutyHours, FileSource, HookConfig, SiteConfig, Token, TokenError, duty,
+    Config, ConfigError, DutyHours, FileSource, HookConfig, SiteConfig, Token, WordFileError, duty,
     load,
 };
 use crate::alert::{Level, Threshold};
@@ -336,8 +336,8 @@ impl SiteConfig {
     /// What callers must know, where they must.
     ///
     /// # Errors
-    /// [`TokenError`].
-    pub fn token(&self) -> Result<Option<Token>, TokenError> {
+    /// [`WordFileError`].
+    pub fn token(&self) -> Result<Option<Token>, WordFileError> {
         self.token_file.as_deref().map(Token::read).transpose()
     }
 }

@@ -28,6 +28,7 @@ mod token;
 pub(crate) mod value;
 mod vector;
 mod webhook;
+mod word_file;
 
 pub use broker::{Broker, BrokerAddress};
 pub use cap::CapFolder;
@@ -44,10 +45,11 @@ pub use mqtt_out::MqttTopic;
 pub use pattern::FilePattern;
 pub use problem::{ConfigError, ConfigProblem, Severity};
 pub use record::RecordFiles;
-pub use secret::{Secret, SecretError};
-pub use token::{Token, TokenError};
+pub use secret::Secret;
+pub use token::Token;
 pub use vector::Vector;
 pub use webhook::{Webhook, WebhookFormat};
+pub use word_file::WordFileError;
 
 use crate::alert::Level;
 use crate::monitor::{Settings, WRITTEN};

@@ -65,7 +65,7 @@ pub enum ConfigError {
     },
     /// The token that it asks callers for.
     #[error(transparent)]
-    Token(#[from] super::TokenError),
+    Token(#[from] super::WordFileError),
     /// It was read and has errors; warnings stand among them.
     #[error("{}", lines(.problems))]
     Invalid {

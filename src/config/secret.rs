@@ -1,59 +1,35 @@
 //! The secret that signs what is sent to a webhook.
 
+use super::word_file::{self, WordFileError, WordKind};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// What it begins with.
 const PREFIX: &str = "whsec_";
 /// How many bytes it has; Standard Webhooks.
 const LENGTHS: std::ops::RangeInclusive<usize> = 24..=64;
+const SECRET: WordKind = WordKind {
+    name: "secret",
+    expected: "whsec_ and 24 to 64 bytes in base64, as from: echo whsec_$(openssl rand -base64 32)",
+};
 
 /// A secret; nothing prints it.
 #[derive(Clone)]
 pub struct Secret(Vec<u8>);
 
-/// A file that holds no usable secret.
-#[derive(Debug, thiserror::Error)]
-pub enum SecretError {
-    /// It cannot be read.
-    #[error("cannot read the secret file {}: {source}", .file.display())]
-    Unreadable {
-        /// The file.
-        file: PathBuf,
-        /// Why not.
-        source: io::Error,
-    },
-    /// What it holds cannot be a secret.
-    #[error(
-        "the secret file {} must hold whsec_ and 24 to 64 bytes in base64, as from: echo whsec_$(openssl rand -base64 32)",
-        .file.display()
-    )]
-    Unusable {
-        /// The file.
-        file: PathBuf,
-    },
-}
-
 impl Secret {
     /// Reads the one word in `file`.
     ///
     /// # Errors
-    /// [`SecretError`].
-    pub fn read(file: &Path) -> Result<Self, SecretError> {
-        let text = std::fs::read_to_string(file).map_err(|source| SecretError::Unreadable {
-            file: file.to_owned(),
-            source,
-        })?;
-        let encoded = text.trim().strip_prefix(PREFIX);
-        let key = encoded.and_then(|encoded| STANDARD.decode(encoded).ok());
-        key.filter(|key| LENGTHS.contains(&key.len()))
-            .map(Self)
-            .ok_or_else(|| SecretError::Unusable {
-                file: file.to_owned(),
-            })
+    /// [`WordFileError`].
+    pub fn read(file: &Path) -> Result<Self, WordFileError> {
+        word_file::read(file, &SECRET, |word| {
+            let encoded = word.strip_prefix(PREFIX)?;
+            let key = STANDARD.decode(encoded).ok()?;
+            LENGTHS.contains(&key.len()).then_some(Self(key))
+        })
     }
 
     /// The key itself.

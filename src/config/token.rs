@@ -1,56 +1,31 @@
 //! The secret that a caller from elsewhere must know.
 
+use super::word_file::{self, WordFileError, WordKind};
 use std::fmt;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use subtle::ConstantTimeEq;
 
 /// A shorter one can be guessed.
 const SHORTEST: usize = 16;
+const TOKEN: WordKind = WordKind {
+    name: "token",
+    expected: "one word of 16 characters or more, as from: openssl rand -hex 32",
+};
 
 /// A secret; nothing prints it.
 #[derive(Clone)]
 pub struct Token(String);
 
-/// A file that holds no usable token.
-#[derive(Debug, thiserror::Error)]
-pub enum TokenError {
-    /// It cannot be read.
-    #[error("cannot read the token file {}: {source}", .file.display())]
-    Unreadable {
-        /// The file.
-        file: PathBuf,
-        /// Why not.
-        source: io::Error,
-    },
-    /// What it holds cannot be a token.
-    #[error(
-        "the token file {} must hold one word of {SHORTEST} characters or more, as from: openssl rand -hex 32",
-        .file.display()
-    )]
-    Unusable {
-        /// The file.
-        file: PathBuf,
-    },
-}
-
 impl Token {
     /// Reads the one word in `file`.
     ///
     /// # Errors
-    /// [`TokenError`].
-    pub fn read(file: &Path) -> Result<Self, TokenError> {
-        let text = std::fs::read_to_string(file).map_err(|source| TokenError::Unreadable {
-            file: file.to_owned(),
-            source,
-        })?;
-        let word = text.trim();
-        let is_word = word.len() >= SHORTEST && word.bytes().all(|byte| byte.is_ascii_graphic());
-        is_word
-            .then(|| Self(word.to_owned()))
-            .ok_or_else(|| TokenError::Unusable {
-                file: file.to_owned(),
-            })
+    /// [`WordFileError`].
+    pub fn read(file: &Path) -> Result<Self, WordFileError> {
+        word_file::read(file, &TOKEN, |word| {
+            let is_plain = word.bytes().all(|byte| byte.is_ascii_graphic());
+            (word.len() >= SHORTEST && is_plain).then(|| Self(word.to_owned()))
+        })
     }
 
     /// Whether `given` is the secret, in a time that says nothing of where it differs.

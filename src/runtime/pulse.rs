@@ -4,7 +4,7 @@ use super::serve::{Limits, ListenError, ListenOptions, ServedState, Server};
 use super::service::Service;
 use super::view::Facts;
 use super::vitals::Vitals;
-use crate::config::{SiteConfig, Token, TokenError};
+use crate::config::{SiteConfig, Token, WordFileError};
 use std::sync::Arc;
 
 /// The address at which the daemon is asked cannot be used.
@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub enum ReportingError {
     /// The token that callers are asked for.
     #[error(transparent)]
-    Token(#[from] TokenError),
+    Token(#[from] WordFileError),
     /// The address cannot be listened on.
     #[error(transparent)]
     Listen(#[from] ListenError),
