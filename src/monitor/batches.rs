@@ -3,7 +3,8 @@
 
 use super::Monitor;
 use super::event::{Event, EventKind};
-use super::track::Track;
+use super::track::{StepContext, Track};
+use crate::alert::Policy;
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -72,10 +73,33 @@ impl Batches {
     }
 }
 
+/// How many of these are refits.
+pub(super) fn count_refits(events: &[Event]) -> usize {
+    let is_refit = |event: &&Event| matches!(event.kind, EventKind::Refit { .. });
+    events.iter().filter(is_refit).count()
+}
+
 impl Monitor {
     /// Whether readings are judged only at [`super::Notice::BatchEnd`].
     pub fn queues(&self) -> bool {
         self.batches.is_queue()
+    }
+
+    /// Judges a benchmark by `how`, and has what explains it searched for where that is due. None without the benchmark.
+    pub(super) fn judged(
+        &mut self,
+        id: &BenchmarkId,
+        now: Timestamp,
+        how: impl FnOnce(&mut Track, &Policy, &StepContext<'_>) -> Vec<Event>,
+    ) -> Vec<Event> {
+        let Some((track, policy, context)) = self.track_at(id, now) else {
+            return Vec::new();
+        };
+        let events = how(track, policy, &context);
+        let search = track.search(policy.critical_velocity_mm_per_day, &context);
+        self.searches.extend(search);
+        self.benchmarks.note_changed(id);
+        events
     }
 
     /// Judges the newest reading of the next benchmarks of the queue; when it was the last one, readings are judged as
@@ -85,16 +109,9 @@ impl Monitor {
         while refits < MOST_REFITS
             && let Some(id) = self.batches.queue.waiting.pop_first()
         {
-            let Some((track, policy, context)) = self.track_at(&id, now) else {
-                continue;
-            };
-            let judged = track.judge_batch(policy, &context);
-            let search = track.search(policy.critical_velocity_mm_per_day, &context);
-            let is_refit = |event: &&Event| matches!(event.kind, EventKind::Refit { .. });
-            refits += judged.iter().filter(is_refit).count();
+            let judged = self.judged(&id, now, Track::judge_batch);
+            refits += count_refits(&judged);
             events.extend(judged);
-            self.searches.extend(search);
-            self.benchmarks.note_changed(&id);
         }
         let queue = &mut self.batches.queue;
         queue.is_open &= !queue.waiting.is_empty();

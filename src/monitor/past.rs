@@ -1,12 +1,13 @@
 //! A first start on a site's history, or on that of one benchmark: the readings are taken at once, what is current is judged, and
 //! the refits of the past are made after it, a few at a time.
 
+use super::Input;
 use super::Monitor;
+use super::batches::count_refits;
 use super::event::{Event, EventKind};
 use super::notice::Notice;
-use super::track::{PAST, PastReplay, StepContext};
-use super::{Input, Track};
-use crate::alert::{Level, Policy};
+use super::track::{PAST, PastReplay};
+use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -126,19 +127,17 @@ impl Monitor {
             let Some(id) = self.past.current.pop_first() else {
                 break;
             };
-            let Some((track, policy, context)) = self.track_at(&id, now) else {
-                continue;
-            };
-            let (newest, judged) = track.judge_newest(policy, &context);
-            let search = track.search(policy.critical_velocity_mm_per_day, &context);
-            let is_refit = |event: &&Event| matches!(event.kind, EventKind::Refit { .. });
-            refits += judged.iter().filter(is_refit).count();
+            let mut newest = None;
+            let judged = self.judged(&id, now, |track, policy, context| {
+                newest = track.newest();
+                let judge = |newest| track.judge_now(policy, newest, context);
+                newest.map_or_else(Vec::new, judge)
+            });
+            refits += count_refits(&judged);
             events.extend(judged);
-            self.searches.extend(search);
             if let Some(newest) = newest {
-                self.past.owed.insert(id.clone(), newest);
+                self.past.owed.insert(id, newest);
             }
-            self.benchmarks.note_changed(&id);
         }
         events
     }
@@ -166,18 +165,5 @@ impl Monitor {
             self.benchmarks.note_changed(&id);
         }
         events
-    }
-}
-
-impl Track {
-    /// Judges the newest reading, whenever it came.
-    fn judge_newest(
-        &mut self,
-        policy: &Policy,
-        context: &StepContext<'_>,
-    ) -> (Option<Timestamp>, Vec<Event>) {
-        let newest = self.newest();
-        let events = newest.map_or_else(Vec::new, |newest| self.judge_now(policy, newest, context));
-        (newest, events)
     }
 }
