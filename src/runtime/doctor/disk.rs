@@ -111,9 +111,7 @@ fn of_source(place: &str, folder: &Path) -> Finding {
 
 /// Of `folder`, or where it would be created.
 fn kind(folder: &Path) -> nix::Result<(String, DiskKind)> {
-    let there = folder.ancestors().find(|path| path.exists());
-    let there = there.filter(|path| !path.as_os_str().is_empty());
-    let magic = statfs(there.unwrap_or(Path::new(".")))?.filesystem_type().0;
+    let magic = statfs(existing_ancestor(folder))?.filesystem_type().0;
     // 32-bit numbers, which some machines sign-extend.
     let magic = magic & 0xFFFF_FFFF;
     let known = FILE_SYSTEMS.iter().find(|(number, ..)| *number == magic);
@@ -126,14 +124,18 @@ fn kind(folder: &Path) -> nix::Result<(String, DiskKind)> {
     })
 }
 
+/// `folder`, or the deepest of those above it that is there.
+fn existing_ancestor(folder: &Path) -> &Path {
+    let there = folder.ancestors().find(|path| path.exists());
+    let there = there.filter(|path| !path.as_os_str().is_empty());
+    there.unwrap_or(Path::new("."))
+}
+
 /// The median time to make 4 KiB durable in the state folder.
 pub(super) fn fsync(folder: &Path) -> Finding {
     let place = folder.display();
     if !folder.is_dir() {
-        let there = folder.ancestors().find(|path| path.exists());
-        let there = there
-            .filter(|path| !path.as_os_str().is_empty())
-            .unwrap_or(Path::new("."));
+        let there = existing_ancestor(folder);
         if let Err(error) = access(there, AccessFlags::W_OK) {
             let there = there.display();
             let text = format!(
@@ -168,9 +170,7 @@ pub(super) fn fsync(folder: &Path) -> Finding {
 pub(super) fn record(files: &RecordFiles) -> Finding {
     let folder = files.path.parent().unwrap_or(Path::new("."));
     let place = folder.display();
-    let there = folder.ancestors().find(|path| path.exists());
-    let there = there.filter(|path| !path.as_os_str().is_empty());
-    let there = there.unwrap_or(Path::new("."));
+    let there = existing_ancestor(folder);
     // What the rights promise, a file system such as /proc need not keep.
     let tried = if there == folder {
         tempfile::tempfile_in(folder).map(drop)
