@@ -44,6 +44,11 @@ pub(super) fn delivery(alert: &Alert, hook: &str) -> Result<Delivery, StoreError
     })
 }
 
+fn delivered_key(alert: &Alert, hook: &str) -> DeliveredKey {
+    let (level, state) = (alert.level.name(), state_name(alert.state));
+    (alert.key.clone(), level, state, hook.to_owned())
+}
+
 impl Delivered {
     /// The receipts in `store`.
     pub fn of(store: Arc<Store>) -> Self {
@@ -110,9 +115,7 @@ impl Delivered {
 
     /// What has become of this alert at `hook`; `None` where nothing says it.
     fn outcome(&self, alert: &Alert, hook: &str) -> Option<DeliveryOutcome> {
-        let (level, state) = (alert.level.name(), state_name(alert.state));
-        let receipt = (alert.key.clone(), level, state, hook.to_owned());
-        if let Some(ended) = self.ended.get(&receipt) {
+        if let Some(ended) = self.ended.get(&delivered_key(alert, hook)) {
             return Some(*ended);
         }
         let store = self.store.as_ref()?;
@@ -139,8 +142,7 @@ impl Delivered {
         hook: &str,
         fate: DeliveryOutcome,
     ) -> Result<(), StoreError> {
-        let (level, state) = (alert.level.name(), state_name(alert.state));
-        let receipt = (alert.key.clone(), level, state, hook.to_owned());
+        let receipt = delivered_key(alert, hook);
         match fate {
             DeliveryOutcome::Delivered
             | DeliveryOutcome::Acknowledged
