@@ -110,6 +110,12 @@ impl Order {
         }
     }
 
+    /// Whether it says that what is in force at this benchmark has been seen.
+    pub fn acknowledges(&self, benchmark: &str) -> bool {
+        let place = self.benchmark().map(BenchmarkId::as_str);
+        matches!(self, Self::Acknowledge { .. }) && place == Some(benchmark)
+    }
+
     /// Whom it concerns; `None`: the whole site.
     pub fn benchmark(&self) -> Option<&BenchmarkId> {
         match self {

@@ -10,7 +10,7 @@ use super::exit::UsageError;
 use super::state::{SiteArgs, is_known, no_benchmark};
 use super::text;
 use crate::alert::Level;
-use crate::config::{Config, EXERCISE, value};
+use crate::config::{EXERCISE, value};
 use crate::monitor::{EventKind, Given, Order, OrderedBy, from_bytes};
 use crate::reading::BenchmarkId;
 use crate::runtime::alarm_state::Alarms;
@@ -155,7 +155,8 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
         return Ok(());
     };
     let (config, store) = site.open()?;
-    let is_of_a_drill = is_of_a_drill(&config, &order);
+    // A drill waits for the acknowledgement of its own benchmark.
+    let is_of_a_drill = config.drill.is_some() && order.acknowledges(EXERCISE);
     if let Some(benchmark) = order.benchmark()
         && !is_of_a_drill
         && !is_known(&config, &store, benchmark)?
@@ -301,13 +302,6 @@ impl Action {
             },
         }))
     }
-}
-
-/// A drill waits for the acknowledgement of its own benchmark.
-fn is_of_a_drill(config: &Config, order: &Order) -> bool {
-    let is_acknowledged = matches!(order, Order::Acknowledge { .. });
-    let place = order.benchmark().map(BenchmarkId::as_str);
-    config.drill.is_some() && is_acknowledged && place == Some(EXERCISE)
 }
 
 /// Nobody is to be left without alerts for ever by one order.

@@ -56,9 +56,11 @@ impl SiteReader {
             return Err(OrderError::NotHere);
         }
         let order = self.order(asked)?;
+        // A drill waits for the acknowledgement of its own benchmark.
+        let is_of_a_drill = self.facts().has_drills && order.acknowledges(EXERCISE);
         if let Some(benchmark) = order.benchmark()
             && !self.known()?.contains(benchmark)
-            && !self.is_of_a_drill(&order)
+            && !is_of_a_drill
         {
             return wrong(format!("there is no benchmark {benchmark}"));
         }
@@ -77,13 +79,6 @@ impl SiteReader {
         tracing::warn!(?order, "an order came over the network");
         self.store.ask(&order)?;
         Ok(order)
-    }
-
-    /// A drill waits for the acknowledgement of its own benchmark.
-    fn is_of_a_drill(&self, order: &Order) -> bool {
-        let is_acknowledged = matches!(order, Order::Acknowledge { .. });
-        let place = order.benchmark().map(BenchmarkId::as_str);
-        self.facts().has_drills && is_acknowledged && place == Some(EXERCISE)
     }
 
     fn order(&self, asked: &Asked) -> Result<Order, OrderError> {
