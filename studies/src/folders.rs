@@ -8,8 +8,11 @@ pub fn project() -> PathBuf {
     own.parent().unwrap_or(own).to_path_buf()
 }
 
-/// A measured series of that name that may be read here but not redistributed, where the folder of these has it.
+/// A measured series of that name that may be read here but not redistributed, where the folder of these has it: the one that
+/// `SLIPWATCH_MEASURED`, an absolute path, named when this was compiled, or else the one beside the project.
 pub fn measured(name: &str) -> Option<PathBuf> {
-    let file = project().join("../shared/data").join(name);
+    let folder = option_env!("SLIPWATCH_MEASURED");
+    let folder = folder.map_or_else(|| project().join("../shared/data"), PathBuf::from);
+    let file = folder.join(name);
     file.exists().then_some(file)
 }
