@@ -56,8 +56,8 @@ fn trajectory_of_a_stable_slope(accuracy: Accuracy) -> Trajectory {
 #[divan::bench(args = [Accuracy::Fit, Accuracy::Full])]
 fn a_year_under_daily_loads(bencher: Bencher, accuracy: Accuracy) {
     let law = Law::from_paper(0.9, 4.0, 30.0, 1.0).unwrap();
-    let days: Vec<f64> = (0..366).map(f64::from).collect();
-    let load = Load::sampled(|day| 0.1 * (day / 58.0).sin(), &days).unwrap();
+    let days = (0..366).map(f64::from);
+    let load = Load::new(days.map(|day| (day, 0.1 * (day / 58.0).sin())).collect()).unwrap();
     let loaded = LoadedLaw::new(&law, &load, accuracy).unwrap();
     let times: Vec<f64> = (0_u32..67).map(|k| f64::from(k) * 5.4).collect();
     let mut motions: Vec<Option<Motion>> = vec![None; times.len()];

@@ -39,17 +39,6 @@ pub struct PaperParameters {
     pub s_theta_i: Option<f64>,
 }
 
-/// Where a law with a stable regime ends up.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum SteadyState {
-    /// It approaches this velocity, in the unit of [`Law::v_i`], a length per day.
-    Approached(f64),
-    /// There is such a velocity, in the same unit, and the law departs from it.
-    Departed(f64),
-    /// No steady velocity.
-    None,
-}
-
 /// How the state variable of a solution is to be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StateSense {
@@ -124,18 +113,6 @@ impl Law {
             a,
             b: a * s_theta_i,
         })
-    }
-
-    /// From the velocity (mm/day) and healing `a` (1/day) at the start, loading b = S theta a, and p.
-    pub fn from_healing(v_i: f64, a: f64, s_theta: f64, p: f64) -> Self {
-        Self {
-            v_i,
-            r: a * (s_theta - 1.0),
-            kappa: a * p,
-            p,
-            a,
-            b: a * s_theta,
-        }
     }
 
     /// From the regular coordinates of a fit; a = kappa/p, and at p = 0 it is unknown (kappa must be 0).

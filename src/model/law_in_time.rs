@@ -2,7 +2,7 @@
 
 use super::box_cox::inverse_box_cox_ln;
 use super::coefficients::Coefficients;
-use super::law::{Law, SteadyState};
+use super::law::Law;
 use super::tail;
 
 impl Law {
@@ -18,22 +18,6 @@ impl Law {
         }
         let ln_y = Coefficients::of(self).ln_y_steady();
         ln_y.is_finite().then_some(ln_y)
-    }
-
-    /// The steady velocity and whether the law goes there.
-    pub fn steady_state(&self) -> SteadyState {
-        match self.ln_y_steady() {
-            None => SteadyState::None,
-            Some(ln_y) if self.kappa < 0.0 => SteadyState::Approached(self.v_i * (-ln_y).exp()),
-            Some(ln_y) => SteadyState::Departed(self.v_i * (-ln_y).exp()),
-        }
-    }
-
-    /// Relaxation time t* = T/(1-m) towards the steady velocity, days, where the law approaches it.
-    pub fn relaxation_days(&self) -> Option<f64> {
-        let ln_y = self.ln_y_steady()?;
-        let rate = -self.kappa * ((self.p - 1.0) * ln_y).exp();
-        (rate > 0.0 && rate.is_finite()).then(|| 1.0 / rate)
     }
 
     /// ln of the y at which the velocity inflects: y*^p = 2b / ((2-p) a).

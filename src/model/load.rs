@@ -47,14 +47,6 @@ impl Load {
         Ok(Self { knots })
     }
 
-    /// A function of days, read at `days` and linear between them.
-    ///
-    /// # Errors
-    /// As [`Load::new`].
-    pub fn sampled(log_load: impl Fn(f64) -> f64, days: &[f64]) -> Result<Self, LawError> {
-        Self::new(days.iter().map(|day| (*day, log_load(*day))).collect())
-    }
-
     /// f at `t`; on a step, its value after it.
     pub fn at(&self, t: f64) -> f64 {
         self.stretch(t, 0).0.log_load

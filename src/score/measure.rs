@@ -91,11 +91,6 @@ fn class_of(days: f64) -> (f64, f64) {
     }
 }
 
-/// The probability given to a failure by the time it came: uniform over failures, if forecasts are calibrated.
-pub fn pit(forecast: &Passage, failed_after_days: f64) -> f64 {
-    forecast.chance_within(failed_after_days)
-}
-
 /// Whether the unconditional interval of 90 % holds the failure; an end that is not reached is later than anything.
 pub fn is_covered(forecast: &Passage, failed_after_days: f64) -> bool {
     let quantile = |share| {
@@ -176,7 +171,6 @@ mod tests {
         assert!(is_covered(&half, 300.0));
         assert!(is_covered(&half, 5.0));
         assert!(!is_covered(&half, 0.5));
-        assert!((pit(&half, 5.0) - 0.5).abs() < 1e-12);
     }
 
     #[test]

@@ -11,7 +11,6 @@ pub use card::{Card, Evaluation, LEADS_DAYS, Lead, Score, Truth, card};
 pub use compare::{Interval, Sum, mean, ratio};
 pub use known::{Known, WholeRecord};
 pub use measure::{
-    LONGEST_SCORED_DAYS, Outcome, RECORDS_SCORED, crps_days, is_covered, log_score, pit,
-    scored_days,
+    LONGEST_SCORED_DAYS, Outcome, RECORDS_SCORED, crps_days, is_covered, log_score, scored_days,
 };
 pub use method::{METHODS, Method};

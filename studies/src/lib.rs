@@ -2,9 +2,11 @@
 //! where the project and measured series lie. The programs in `src/bin` write the project's tables.
 
 mod folders;
+mod healing;
 mod life;
 mod world;
 
 pub use folders::{measured, project};
+pub use healing::law_from_healing;
 pub use life::{Corpus, Fate, Life};
 pub use world::{Family, GaugeKind, Simulated};

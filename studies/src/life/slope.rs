@@ -2,6 +2,7 @@
 
 use super::load::STEP_DAYS;
 use super::{Fate, Life, log_uniform};
+use crate::healing::law_from_healing;
 use rand::{Rng, RngExt};
 use slipwatch::model::{Accuracy, Law, Load, LoadedLaw};
 
@@ -43,11 +44,11 @@ pub(super) fn law(fate: Fate, duration: f64, generator: &mut impl Rng) -> Law {
     let p = 1.0 - 1.0 / m;
     if fate == Fate::Failing {
         let s_theta = 1.0 + log_uniform(generator, 0.2, 10.0);
-        let unit = Law::from_healing(1.0, 1.0, s_theta, p);
+        let unit = law_from_healing(1.0, 1.0, s_theta, p);
         let a = unit.failure_days().unwrap_or(1.0) / duration;
         // v ~ (D_c/m) / (t_c - t) near failure, and D_c/m = v_i/b, mm.
         let v_i = log_uniform(generator, 50.0, 1000.0) * s_theta * a;
-        return Law::from_healing(v_i, a, s_theta, p);
+        return law_from_healing(v_i, a, s_theta, p);
     }
     // The velocity it keeps over that of the creep.
     let gain = match fate {
@@ -72,7 +73,7 @@ pub(super) fn law(fate: Fate, duration: f64, generator: &mut impl Rng) -> Law {
         | Fate::Seasonal
         | Fate::Reset => log_uniform(generator, 0.1, 10.0),
     };
-    Law::from_healing(v_i, a, gain.powf((1.0 - m) / m), p)
+    law_from_healing(v_i, a, gain.powf((1.0 - m) / m), p)
 }
 
 fn m(fate: Fate, generator: &mut impl Rng) -> f64 {

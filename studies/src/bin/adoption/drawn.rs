@@ -9,6 +9,7 @@ use slipwatch::reading::{
     BenchmarkId, Channel, LengthUnit, Reading, Recording, Sample, Series, Timestamp, Unit,
     after_days,
 };
+use studies::law_from_healing;
 
 /// Days between two values of the load.
 const TICK: f64 = 0.1;
@@ -67,7 +68,7 @@ fn attempt(fails: bool, seed: u64) -> Result<Option<Life>> {
             uniform(&mut rng, 0.5, 3.0) / span,
             uniform(&mut rng, 0.0, 0.6),
         );
-        Law::from_healing(v_i, a, uniform(&mut rng, 0.6, 1.0), p)
+        law_from_healing(v_i, a, uniform(&mut rng, 0.6, 1.0), p)
     };
     let loaded = LoadedLaw::new(&law, &load, Accuracy::Fit)?;
     let failure = loaded.failure_days(span);
@@ -105,7 +106,7 @@ fn attempt(fails: bool, seed: u64) -> Result<Option<Life>> {
 /// A law that fails at that day under the load.
 fn failing_at(rng: &mut Pcg64, (v_i, at): (f64, f64), load: &Load) -> Result<Law> {
     let (a, p) = (uniform(rng, 0.02, 0.5) / at, uniform(rng, 0.05, 0.6));
-    let of = |ratio: f64| Law::from_healing(v_i, a, ratio, p);
+    let of = |ratio: f64| law_from_healing(v_i, a, ratio, p);
     let (mut low, mut high) = (1e-3_f64, 1e4_f64);
     for _ in 0..50 {
         let middle = (low * high).sqrt();

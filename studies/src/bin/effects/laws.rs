@@ -3,6 +3,7 @@
 use super::chance::{log_uniform, one_of, uniform};
 use rand_pcg::Pcg64;
 use slipwatch::model::Law;
+use studies::law_from_healing;
 
 /// What a slope does under a constant load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,7 +38,7 @@ pub(crate) fn draw(rng: &mut Pcg64, choices: &[(f64, Character)], length: f64) -
         Character::Creeping => {
             let p = stable_p(rng);
             let relaxation = length * log_uniform(rng, 0.03, 2.0);
-            Law::from_healing(1.0, -1.0 / (p * relaxation), 1.0, p)
+            law_from_healing(1.0, -1.0 / (p * relaxation), 1.0, p)
         }
         Character::Accelerating => {
             let p = 1.0 - 1.0 / uniform(rng, 1.02, 1.7);
@@ -64,7 +65,7 @@ pub(crate) fn draw(rng: &mut Pcg64, choices: &[(f64, Character)], length: f64) -
             let p = 1.0 - 1.0 / uniform(rng, 1.05, 1.7);
             let s_theta = log_uniform(rng, 0.05, 0.7);
             let a = log_uniform(rng, 0.5, 20.0) / length;
-            Law::from_healing(1.0, a, s_theta, p)
+            law_from_healing(1.0, a, s_theta, p)
         }
         Character::Settling => {
             let gain = log_uniform(rng, 0.1, 0.6);
@@ -75,10 +76,10 @@ pub(crate) fn draw(rng: &mut Pcg64, choices: &[(f64, Character)], length: f64) -
 
 /// The law that fails after `duration` days.
 fn failing(s_theta: f64, p: f64, duration: f64) -> Law {
-    let unit = Law::from_healing(1.0, 1.0, s_theta, p)
+    let unit = law_from_healing(1.0, 1.0, s_theta, p)
         .failure_days()
         .unwrap_or(1.0);
-    Law::from_healing(1.0, unit / duration, s_theta, p)
+    law_from_healing(1.0, unit / duration, s_theta, p)
 }
 
 /// Towards `gain` times its velocity, in a share of the record.
@@ -88,7 +89,7 @@ fn relaxing(rng: &mut Pcg64, gain: f64, length: f64) -> Law {
     let relaxation = length * log_uniform(rng, 0.1, 0.7);
     // t* = 1 / (-kappa y^(p-1)) at the steady y = 1/gain.
     let a = 1.0 / (relaxation * -p * gain.powf(1.0 - p));
-    Law::from_healing(1.0, a, s_theta, p)
+    law_from_healing(1.0, a, s_theta, p)
 }
 
 /// 0 < m < 1, seldom close to 1 where a slow load is felt 1/(1-m) times.

@@ -3,7 +3,7 @@
 use crate::corpus::{Evaluation, Kind, Subject};
 use slipwatch::forecast::Passage;
 use slipwatch::reading::Timestamp;
-use slipwatch::score::{Known, Method, Outcome, is_covered, pit};
+use slipwatch::score::{Known, Method, Outcome, is_covered};
 
 /// A passage is reduced to so many times, each of about the same share of it.
 const MOST_TIMES: u32 = 64;
@@ -63,7 +63,7 @@ impl Record {
             pit: said
                 .as_ref()
                 .zip(after)
-                .map(|(said, after)| pit(said, after)),
+                .map(|(said, after)| said.chance_within(after)),
             covered: spread
                 .zip(after)
                 .map(|(said, after)| is_covered(said, after)),
