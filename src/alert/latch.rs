@@ -77,7 +77,7 @@ const SEEN: i32 = 2;
 /// Motion that does not gain stays under this factor of what it was when the stretch began.
 const STEADY_GAIN: f64 = 1.2;
 /// A settled velocity differs from another, or from rest, that is so many times its standard error.
-const CLEAR: f64 = 4.0;
+const CLEAR_ERRORS: f64 = 4.0;
 /// Observed deceleration: this share of the highest velocity at the level, and under that at which the level was entered. After a
 /// part has failed the rest may creep on at a tenth of the highest velocity, and faster than when people were called out.
 const SLOWED_TO: f64 = 0.5;
@@ -114,7 +114,7 @@ impl SteadyStretch {
             newest: None,
             longest_gap: SignedDuration::ZERO,
         };
-        let most = |stretch: &Self| STEADY_GAIN * stretch.velocity + CLEAR * error;
+        let most = |stretch: &Self| STEADY_GAIN * stretch.velocity + CLEAR_ERRORS * error;
         let going_on = stretch.filter(|stretch| velocity <= most(stretch));
         let stretch = going_on.unwrap_or(begin);
         let gap = stretch.newest.map(|newest| now.duration_since(newest));
@@ -233,7 +233,7 @@ impl Latch {
         let less = call.level < self.level;
         let error = evidence.settled_error_mm_per_day;
         // What is no larger than its error is no peak: readings that are spoilt would raise it, and then seem to slow down.
-        if velocity > CLEAR * error {
+        if velocity > CLEAR_ERRORS * error {
             self.peak_velocity = self.peak_velocity.max(velocity);
             if self.first_velocity <= 0.0 && self.level > Level::Green {
                 self.first_velocity = velocity;
@@ -247,7 +247,7 @@ impl Latch {
         let slowed = less && is_slow && !pauses;
         // A slope that has become faster since the level was called is not over it while more than nothing is called, until it has slowed
         // down to half of its highest velocity and no chance calls orange.
-        let is_no_faster = velocity <= STEADY_GAIN * self.first_velocity + CLEAR * error;
+        let is_no_faster = velocity <= STEADY_GAIN * self.first_velocity + CLEAR_ERRORS * error;
         let is_past_its_peak = self.is_at_half_of_its_peak(velocity, error) && !is_likely;
         let is_over = is_no_faster
             || is_past_its_peak
@@ -262,7 +262,7 @@ impl Latch {
     fn has_slowed_to(&self, velocity: f64, error: f64) -> bool {
         // States of earlier versions do not have the first velocity.
         let is_under_first =
-            self.first_velocity <= 0.0 || velocity <= self.first_velocity + CLEAR * error;
+            self.first_velocity <= 0.0 || velocity <= self.first_velocity + CLEAR_ERRORS * error;
         self.is_at_half_of_its_peak(velocity, error) && is_under_first
     }
 
@@ -325,7 +325,7 @@ impl Latch {
 
     fn begin(&mut self, evidence: &AlertEvidence, level: Level) {
         let velocity = evidence.settled_velocity_mm_per_day.map_or(0.0, f64::abs);
-        let has_stood_out = velocity > CLEAR * evidence.settled_error_mm_per_day;
+        let has_stood_out = velocity > CLEAR_ERRORS * evidence.settled_error_mm_per_day;
         *self = Self {
             level,
             since: Some(evidence.now),

@@ -46,7 +46,7 @@ const WIDTH: usize = 80;
 /// What a line begins with that goes on with the one before it.
 const CONTINUED: &str = "    ";
 /// Puts a terminal's cursor at the top of an empty screen.
-const CLEAR: &str = "\u{1b}[H\u{1b}[2J";
+const CLEAR_SCREEN: &str = "\u{1b}[H\u{1b}[2J";
 
 /// How one benchmark stands.
 #[derive(Debug, JsonSchema, Serialize)]
@@ -140,7 +140,7 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
         let status = gathered(args)?;
         if args.watch && args.site.output.format == OutputFormat::Text && io::stdout().is_terminal()
         {
-            write!(io::stdout(), "{CLEAR}")?;
+            write!(io::stdout(), "{CLEAR_SCREEN}")?;
         }
         let (status, zone) = &status;
         args.site.output.print(status, |status| {

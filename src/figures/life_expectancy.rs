@@ -16,7 +16,7 @@ const DRAWN: [(&str, &str); 5] = [
 ];
 const BLACK: &str = "#000000";
 /// A forecast farther off than this many times the longest time left is not drawn.
-const FARTHEST: f64 = 2.0;
+const FARTHEST_RATIO: f64 = 2.0;
 
 /// The plot of a scorecard, one SVG text; `failure` is drawn where there was one.
 pub fn life_expectancy(card: &Card, failure: Option<Timestamp>) -> String {
@@ -27,7 +27,7 @@ pub fn life_expectancy(card: &Card, failure: Option<Timestamp>) -> String {
         .map_or(first + 1.0, |(at, _)| day(*at))
         .max(first + 1e-3);
     let end = failure.map_or(last, day);
-    let highest = FARTHEST * (end - first).max(1e-3);
+    let highest = FARTHEST_RATIO * (end - first).max(1e-3);
     let in_view = |left: f64| (left <= highest).then_some(left);
     let mut marks = Vec::new();
     if failure.is_some() {

@@ -4,12 +4,12 @@ use super::rates::Observations;
 
 impl Observations {
     /// Readings that a bounded record keeps.
-    pub const MOST: usize = 2048;
+    pub const MOST_READINGS: usize = 2048;
 
-    /// Where there are more than [`Self::MOST`], lets those of the older half go that count as one with the
+    /// Where there are more than [`Self::MOST_READINGS`], lets those of the older half go that count as one with the
     /// reading before them, or else every second one of it.
     pub fn compact(&mut self) {
-        if self.values.len() <= Self::MOST {
+        if self.values.len() <= Self::MOST_READINGS {
             return;
         }
         let half = self.values.len() / 2;

@@ -26,7 +26,7 @@ const MORE: [(Branch, f64); 7] = [
 /// |ln `y_s`| at the anchor, from far to near.
 const EXCESS: [f64; 7] = [12.0, 6.0, 3.6, 2.2, 1.2, 0.5, 0.1];
 /// A curve is solved from here on.
-const FARTHEST: f64 = 14.0;
+const FARTHEST_LN_STEADY: f64 = 14.0;
 /// Far from the steady state: the knee, as shares of the record.
 const KNEES: [f64; 9] = [0.15, 0.4, 0.6, 0.76, 0.88, 0.97, 1.15, 1.8, 4.0];
 /// Beyond the knee: the record's length in relaxation times.
@@ -130,7 +130,7 @@ impl CurveFamily {
         let sign = chart.shape(&[0.0; 3]).slope.signum();
         let shape = CurveShape {
             slope: sign,
-            ln_steady: sign * FARTHEST,
+            ln_steady: sign * FARTHEST_LN_STEADY,
             p,
         };
         // Followed until it all but stands still, or leaves the range of numbers.

@@ -9,7 +9,7 @@
 
 use super::evidence::{self, Evidence};
 use super::learned::LEARNED;
-use super::members::{LONGEST_DAYS, MOST, Members};
+use super::members::{LARGEST_INPUT, LONGEST_DAYS, Members};
 use super::network::{INPUTS, Network};
 use super::sudden::slowed;
 use super::{Passage, PastEvent, Scale, Scales};
@@ -249,7 +249,7 @@ impl Indicators {
         setting(&view, self.evidence.ln_odds(), &mut inputs);
         members.expect(days, &mut inputs);
         let shown = self.evidence.ln_odds_within(days);
-        inputs.push((0.2 * shown).clamp(-MOST, MOST));
+        inputs.push((0.2 * shown).clamp(-LARGEST_INPUT, LARGEST_INPUT));
         inputs
     }
 }
@@ -438,7 +438,7 @@ fn ln_above(value: f64, error: f64) -> f64 {
 
 /// How the velocity grows from scale to scale, and its changes against the usual ones.
 fn motion(view: &View<'_>, inputs: &mut Vec<f64>) {
-    let bounded = |value: f64| value.clamp(-MOST, MOST);
+    let bounded = |value: f64| value.clamp(-LARGEST_INPUT, LARGEST_INPUT);
     for longer in -5..3 {
         inputs.push(bounded(
             view.ln_velocity(longer) - view.ln_velocity(longer + 1),
@@ -460,7 +460,7 @@ fn motion(view: &View<'_>, inputs: &mut Vec<f64>) {
 
 /// How the newest motion compares with all that the record showed before.
 fn novelty(view: &View<'_>, inputs: &mut Vec<f64>) {
-    let bounded = |value: f64| value.clamp(-MOST, MOST);
+    let bounded = |value: f64| value.clamp(-LARGEST_INPUT, LARGEST_INPUT);
     for longer in [-4, -2, -1, 0, 2] {
         let scale = view.scale(longer);
         let before = ln_above(scale.highest_velocity, error(scale));
@@ -489,7 +489,7 @@ fn setting(view: &View<'_>, ln_odds: f64, inputs: &mut Vec<f64>) {
     }
     inputs.push(view.scale(0).jump);
     inputs.push(view.scale(-2).jump);
-    inputs.push((0.2 * ln_odds).clamp(-MOST, MOST));
+    inputs.push((0.2 * ln_odds).clamp(-LARGEST_INPUT, LARGEST_INPUT));
     inputs.push(0.1 * (view.longest + 1) as f64);
     let span = scales.base_days.ln() + std::f64::consts::LN_2 * view.span as f64;
     inputs.push(0.3 * span.clamp(-4.0, 4.0));

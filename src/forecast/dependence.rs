@@ -9,9 +9,9 @@ const UNSEEN: f64 = 0.25;
 /// correlate by .45, the errors of their forecasts by .2 to .5.
 const UNKNOWN: f64 = 0.6;
 /// Fewest rates in common, for the four coefficients that are fitted to each.
-const FEWEST: usize = 9;
+const FEWEST_RATES: usize = 9;
 /// The curve that is taken from ln v is a cubic in ln of the time ago, over this share of the common time.
-const NEAR: f64 = 0.1;
+const NEAR_SHARE: f64 = 0.1;
 
 /// The correlation of each two benchmarks' forecasts.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,11 +74,11 @@ fn correlation(a: &CommonMotion, b: &CommonMotion) -> Option<f64> {
         .iter()
         .filter_map(|(ago, ln)| Some((*ago, *ln, at(b, *ago)?)))
         .collect();
-    if common.len() < FEWEST {
+    if common.len() < FEWEST_RATES {
         return None;
     }
     let (newest, oldest) = (common[common.len() - 1].0, common[0].0);
-    let near = NEAR * (oldest - newest).max(f64::MIN_POSITIVE);
+    let near = NEAR_SHARE * (oldest - newest).max(f64::MIN_POSITIVE);
     let places: Vec<f64> = common
         .iter()
         .map(|(ago, ..)| ((ago - newest) / near).ln_1p())

@@ -6,19 +6,19 @@ use crate::reading::Quantity;
 use std::borrow::Cow;
 
 /// Readings away from the course, at most.
-const MOST: usize = 3;
+const MOST_AWAY: usize = 3;
 /// So many standard errors of a reading they are away, at least,
 const AWAY: f64 = 6.0;
 /// and farther than the slope moves meanwhile; each of them by this share of the farthest.
 const ALIKE: f64 = 0.5;
 /// Fewer readings show nothing.
-const FEWEST: usize = 10;
+const FEWEST_READINGS: usize = 10;
 
 /// The observations without those that left the course and came back for two readings at least. The newest ones always stay: they may be the
 /// first of a motion.
 pub(super) fn without_excursions(observations: &Observations) -> Cow<'_, Observations> {
     let values = &observations.values;
-    if observations.quantity != Quantity::Displacement || values.len() < FEWEST {
+    if observations.quantity != Quantity::Displacement || values.len() < FEWEST_READINGS {
         return Cow::Borrowed(observations);
     }
     let away = AWAY * displacement_sigma(values);
@@ -62,7 +62,7 @@ fn excursion(before: &Observation, later: &[Observation], away: f64) -> usize {
             && later[..*count].iter().all(|one| share(one) >= ALIKE)
             && share(&later[*count + 1]).abs() < ALIKE
     };
-    let most = MOST.min(later.len().saturating_sub(2));
+    let most = MOST_AWAY.min(later.len().saturating_sub(2));
     (1..=most).find(comes_back).unwrap_or(0)
 }
 

@@ -34,7 +34,7 @@ const LEAST_SUM: f64 = 1e-12;
 /// The most that the misfits of neighbours are taken to be correlated.
 const MOST_CORRELATION: f64 = 0.5;
 /// A rate counts that is so many times its standard error.
-const CLEAR: f64 = 2.0;
+const CLEAR_ERRORS: f64 = 2.0;
 /// The standard deviation of ln of the time that remains, and the roughness, by which the law is known so badly that little of it
 /// counts. Set on simulated slopes: those whose motion is rough, or that keep no law, lose nothing by it.
 const KNOWN: f64 = 0.5;
@@ -91,7 +91,7 @@ impl FreeExponent {
     /// After `rates`, the newest last; `None` with too few of them that move.
     pub(super) fn fit(rates: &[Rate], now_days: f64) -> Option<Self> {
         let moving = rates.iter().rev();
-        let moving = moving.filter(|rate| rate.velocity > (CLEAR * rate.sigma).max(0.0));
+        let moving = moving.filter(|rate| rate.velocity > (CLEAR_ERRORS * rate.sigma).max(0.0));
         let points: Vec<MovingRate> = moving
             .map(|rate| MovingRate {
                 ago: now_days - rate.middle(),

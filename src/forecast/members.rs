@@ -15,13 +15,13 @@ const LINES: [usize; 3] = [8, 16, 32];
 /// slopes of all kinds that fail: a share that did not ask for agreement put the collapse of those that keep no straight line
 /// (exponential, levelled) at half of the time that remained.
 const TIMED: f64 = 0.8;
-const APART: f64 = 0.3;
+const APART_LN_TIME: f64 = 0.3;
 /// How far the time of a collapse is that of Voight's relation where that is kept to the letter.
 const BY_VOIGHT: f64 = 0.8;
 /// How much less of it counts where law and lines agree already.
 const AGREED: f64 = 0.5;
 /// Inputs lie between plus and minus this.
-pub(super) const MOST: f64 = 3.0;
+pub(super) const LARGEST_INPUT: f64 = 3.0;
 /// The longest span that is asked for, days.
 pub(super) const LONGEST_DAYS: f64 = 1200.0;
 
@@ -111,7 +111,7 @@ impl Members {
         let count = (1 + LINES.len()) as f64;
         let mean = times().sum::<f64>() / count;
         let square: f64 = times().map(|time| (time - mean).powi(2)).sum();
-        (-square / ((count - 1.0) * APART * APART)).exp()
+        (-square / ((count - 1.0) * APART_LN_TIME * APART_LN_TIME)).exp()
     }
 
     pub(super) fn expect(&self, days: f64, inputs: &mut Vec<f64>) {
@@ -120,7 +120,7 @@ impl Members {
             inputs.push(0.4 * ((chance + 0.01) / (1.01 - chance)).ln());
         }
         for line in self.lines {
-            inputs.push((0.6 * (2.0 * days * line).asinh()).clamp(-MOST, MOST));
+            inputs.push((0.6 * (2.0 * days * line).asinh()).clamp(-LARGEST_INPUT, LARGEST_INPUT));
         }
     }
 }

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 /// Newest spans between readings that say how a slope is sampled.
 pub(super) const SPANS: usize = 256;
 /// Fewest sessions.
-const FEWEST: usize = 6;
+const FEWEST_SESSIONS: usize = 6;
 /// Most rounds of a session: more of them, as in working hours, show motion.
 const MOST_ROUNDS: usize = 16;
 /// A session lasts no longer than this share of a pause.
@@ -67,7 +67,7 @@ fn pattern(values: &[Observation]) -> Option<SessionPattern> {
     let is_often = 2 * rounds >= pauses.len() && rounds < MOST_ROUNDS * pauses.len();
     let lasts = longest_round * (rounds as f64 / pauses.len() as f64);
     let longest = LASTS * usual_pause;
-    (pauses.len() + 1 >= FEWEST && is_often && lasts <= longest).then(|| SessionPattern {
+    (pauses.len() + 1 >= FEWEST_SESSIONS && is_often && lasts <= longest).then(|| SessionPattern {
         least_pause: (longest_round * pause).sqrt(),
         longest,
     })

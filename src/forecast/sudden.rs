@@ -10,13 +10,13 @@ use crate::reading::Quantity;
 /// on daily readings that stay there the chance within 30 days was .92, .86, .68, .39 and .25 on the first day.
 const FASTER: f64 = 4.0;
 /// So many intervals in a row are motion; fewer may be a jump of the instrument.
-const FEWEST: usize = 3;
+const FEWEST_INTERVALS: usize = 3;
 /// The newest intervals that are looked at.
-const MOST: usize = 128;
+const MOST_INTERVALS: usize = 128;
 /// No interval of the newest motion is slower than this share of what is asked of three.
 const SLOWEST: f64 = 0.5;
 /// Standard errors by which the newest velocities stand out.
-const CLEAR: f64 = 2.0;
+const CLEAR_ERRORS: f64 = 2.0;
 
 /// The observations with the newest motion slowed down to [`FASTER`] times the highest velocity before, or, in its first intervals, to that velocity;
 /// `None` where it is no faster.
@@ -40,7 +40,7 @@ pub(super) fn slowed(observations: &Observations) -> Option<Observations> {
     })
 }
 
-/// Velocities over one interval and over [`FEWEST`], by the reading at which they end; mm/day.
+/// Velocities over one interval and over [`FEWEST_INTERVALS`], by the reading at which they end; mm/day.
 struct SuddenMotion {
     one: Vec<f64>,
     three: Vec<f64>,
@@ -51,12 +51,15 @@ struct SuddenMotion {
 impl SuddenMotion {
     fn of(observations: &Observations) -> Option<Self> {
         let values = &observations.values;
-        if values.len() <= 2 * FEWEST {
+        if values.len() <= 2 * FEWEST_INTERVALS {
             return None;
         }
         let (sigma, is_moved) = match observations.quantity {
             Quantity::Displacement => (displacement_sigma(values) * std::f64::consts::SQRT_2, true),
-            Quantity::Velocity => (velocity_sigma(values) / (FEWEST as f64).sqrt(), false),
+            Quantity::Velocity => (
+                velocity_sigma(values) / (FEWEST_INTERVALS as f64).sqrt(),
+                false,
+            ),
         };
         let over = |at: usize, back: usize| {
             let before = &values[at.saturating_sub(back)];
@@ -69,7 +72,7 @@ impl SuddenMotion {
         };
         let error = |at: usize| {
             if is_moved {
-                sigma / (values[at].t_days - values[at.saturating_sub(FEWEST)].t_days)
+                sigma / (values[at].t_days - values[at.saturating_sub(FEWEST_INTERVALS)].t_days)
             } else {
                 sigma
             }
@@ -78,7 +81,7 @@ impl SuddenMotion {
         let known = |of: f64| if of.is_finite() { of } else { 0.0 };
         Some(Self {
             one: each().map(|at| known(over(at, 1))).collect(),
-            three: each().map(|at| known(over(at, FEWEST))).collect(),
+            three: each().map(|at| known(over(at, FEWEST_INTERVALS))).collect(),
             error: each().map(|at| known(error(at))).collect(),
         })
     }
@@ -86,13 +89,13 @@ impl SuddenMotion {
     /// After which of the newest readings the slope moves so fast, one or two intervals long, and what share of that it moved by before.
     fn first(&self) -> Option<(usize, f64)> {
         let count = self.one.len();
-        let steps = (1..FEWEST).rev().map(|long| count - 1 - long);
+        let steps = (1..FEWEST_INTERVALS).rev().map(|long| count - 1 - long);
         let mut found = steps.filter_map(|from| {
-            let before = self.three[FEWEST..=from]
+            let before = self.three[FEWEST_INTERVALS..=from]
                 .iter()
                 .copied()
                 .fold(0.0, f64::max);
-            let error = FEWEST as f64 * CLEAR * self.error[from];
+            let error = FEWEST_INTERVALS as f64 * CLEAR_ERRORS * self.error[from];
             let newest = self.one[from + 1..]
                 .iter()
                 .copied()
@@ -102,12 +105,12 @@ impl SuddenMotion {
         found.next()
     }
 
-    /// After which reading the newest motion begins, of [`FEWEST`] intervals or more, and what share of it is [`FASTER`] times as fast as all before;
+    /// After which reading the newest motion begins, of [`FEWEST_INTERVALS`] intervals or more, and what share of it is [`FASTER`] times as fast as all before;
     /// that by which it is fastest.
     fn sudden(&self) -> Option<(usize, f64)> {
         let count = self.one.len();
-        let first = count.saturating_sub(MOST).max(FEWEST);
-        let mut before = self.three[FEWEST..=first]
+        let first = count.saturating_sub(MOST_INTERVALS).max(FEWEST_INTERVALS);
+        let mut before = self.three[FEWEST_INTERVALS..=first]
             .iter()
             .copied()
             .fold(0.0, f64::max);
@@ -117,14 +120,14 @@ impl SuddenMotion {
             let (one, three) = slowest[at + 1];
             slowest[at] = (
                 one.min(self.one[at]),
-                three.min(self.three[at] - CLEAR * self.error[at]),
+                three.min(self.three[at] - CLEAR_ERRORS * self.error[at]),
             );
         }
         let mut most: Option<(usize, f64)> = None;
-        for from in first..count - FEWEST {
+        for from in first..count - FEWEST_INTERVALS {
             before = before.max(self.three[from]);
-            let base = before.max(CLEAR * self.error[from]);
-            let (one, three) = (slowest[from + 1].0, slowest[from + FEWEST].1);
+            let base = before.max(CLEAR_ERRORS * self.error[from]);
+            let (one, three) = (slowest[from + 1].0, slowest[from + FEWEST_INTERVALS].1);
             let faster = three / base;
             let is_even = one >= SLOWEST * FASTER * base;
             if base > 0.0 && faster > FASTER && is_even && most.is_none_or(|most| faster > most.1) {

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 /// Readings that say what is usual.
 const REMEMBERED: usize = 24;
-const FEWEST: usize = 8;
+const FEWEST_READINGS: usize = 8;
 /// A reading this much less likely than the usual one stands out: once in some thousand readings by chance.
 const STANDS_OUT_NATS: f64 = 7.0;
 /// And by so many times what the most surprising of the latest ones did: where noise is as large as the motion, a velocity's logarithm
@@ -28,7 +28,7 @@ impl Surprise {
         if self.log_densities.len() > REMEMBERED {
             self.log_densities.pop_front();
         }
-        if usual.len() < FEWEST {
+        if usual.len() < FEWEST_READINGS {
             return None;
         }
         let median = usual[usual.len() / 2];

@@ -12,7 +12,7 @@ const ALPHAS: (f64, f64, u32) = (0.0, 0.01, 501);
 /// Distances of the pole from the record looked at, over the record's length: lowest, highest, how many.
 const POLES: (f64, f64, u32) = (1e-4, 1e3, 500);
 /// Fewest rates for three unknowns and a scatter.
-const FEWEST: usize = 6;
+const FEWEST_RATES: usize = 6;
 /// 90 % quantile of chi squared with one degree of freedom.
 const DROP: f64 = CHI_SQUARED_90;
 /// ln v is never known better than this.
@@ -61,7 +61,7 @@ pub(super) fn exponent(rates: &[Rate]) -> Option<Estimate> {
         return None;
     };
     let length = last.0 - first.0;
-    if points.len() < FEWEST || length <= 0.0 {
+    if points.len() < FEWEST_RATES || length <= 0.0 {
         return None;
     }
     let profile = profile(&points, length);

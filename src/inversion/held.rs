@@ -3,9 +3,9 @@
 use crate::fit::{Ensemble, Exponent, LawDraws, LawSample};
 
 /// p = 1 - 1/m is within this of that of the m given, and on the same side of 0: which separates the regimes.
-const NEAR: f64 = 0.05;
+const NEAR_P: f64 = 0.05;
 /// Fewer laws than this bound nothing.
-const FEWEST: usize = 50;
+const FEWEST_LAWS: usize = 50;
 
 /// All of it where m is free; `None` where too few of its laws have the m that is given.
 pub(super) fn under(exponent: Exponent, posterior: LawDraws) -> Option<LawDraws> {
@@ -13,12 +13,12 @@ pub(super) fn under(exponent: Exponent, posterior: LawDraws) -> Option<LawDraws>
         return Some(posterior);
     };
     let given = 1.0 - 1.0 / m;
-    let is_near = |p: f64| (p - given).abs() <= NEAR && p * given >= 0.0;
+    let is_near = |p: f64| (p - given).abs() <= NEAR_P && p * given >= 0.0;
     let all = posterior.ensemble.samples.iter();
     let kept = all.zip(&posterior.spans_days);
     let kept = kept.filter(|(sample, _)| is_near(sample.law.p));
     let (mut samples, spans_days): (Vec<LawSample>, Vec<f64>) = kept.unzip();
-    if samples.len() < FEWEST {
+    if samples.len() < FEWEST_LAWS {
         return None;
     }
     let total: f64 = samples.iter().map(|one| one.weight).sum();

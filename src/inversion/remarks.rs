@@ -16,7 +16,7 @@ const STOOD_STILL: &str = "The two regimes differ, and the newest readings do no
 
 /// The newest share of a record that is looked at, with at least so many rates.
 const NEWEST: f64 = 1.0 / 3.0;
-const FEWEST: usize = 6;
+const FEWEST_RATES: usize = 6;
 /// A velocity stands still where its change over that, ln, is less than this with 95 % certainty.
 const STILL: f64 = 0.1;
 const CERTAIN: f64 = HALF_WIDTH_90;
@@ -29,7 +29,7 @@ pub(super) fn has_stood_still(rates: &[Rate]) -> bool {
     let from = last.to - NEWEST * (last.to - first.from);
     let newest: Vec<&Rate> = rates.iter().filter(|rate| rate.middle() >= from).collect();
     let moves = newest.iter().all(|rate| rate.velocity > 0.0);
-    if newest.len() < FEWEST || !moves {
+    if newest.len() < FEWEST_RATES || !moves {
         return false;
     }
     let n = newest.len() as f64;

@@ -30,7 +30,7 @@ impl Default for SweepOptions {
 /// A bound on the work of one sweep.
 const MOST_STEPS: usize = 1000;
 /// Readings before the first `t_max`, by default.
-const FEWEST: usize = 8;
+const FEWEST_READINGS: usize = 8;
 
 /// A sweep.
 #[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
@@ -118,7 +118,10 @@ fn t_maxes(series: &Series, steps: &SweepOptions) -> Vec<Timestamp> {
     let (Some(start), Some(end)) = (readings.first(), readings.last()) else {
         return Vec::new();
     };
-    let early = (readings.len() / 4).max(FEWEST).min(readings.len()) - 1;
+    let early = (readings.len() / 4)
+        .max(FEWEST_READINGS)
+        .min(readings.len())
+        - 1;
     let first = steps.first.unwrap_or(readings[early].time).max(start.time);
     let last = steps.last.unwrap_or(end.time).min(end.time);
     let count = steps.steps.clamp(1, MOST_STEPS);

@@ -20,7 +20,7 @@ const NEWTON_STEPS: usize = 8;
 /// A Newton step of ln v this small leaves an error of its square.
 const CONVERGED: f64 = 1e-6;
 /// Where the balance moves by no more than this at once, the last velocity is a start for the next.
-const NEAR: f64 = 1.0;
+const NEAR_LN_V: f64 = 1.0;
 
 /// What drives the block, on nodes of increasing time.
 #[derive(Debug, Clone, Copy)]
@@ -186,7 +186,7 @@ impl Friction {
             };
         }
         let moved = target - last.ln_v - self.per_velocity * last.v;
-        let mut ln_v = if moved.abs() < NEAR {
+        let mut ln_v = if moved.abs() < NEAR_LN_V {
             last.ln_v + moved / (1.0 + self.per_velocity * last.v)
         } else {
             // Below ln v = target and eta v = target, whichever is less.

@@ -8,7 +8,7 @@ use super::coefficients::Coefficients;
 use super::taylor::{MAX_ORDER, TaylorSeries, radius, step_fraction};
 
 /// Beyond this |z - 1| max(1, |p - 1|) the series is not worth trying.
-const FARTHEST: f64 = 0.4;
+const FARTHEST_DISTANCE: f64 = 0.4;
 
 /// Steps of Newton's method, of which from within 0.4 the fifth changes nothing any more.
 const MOST_NEWTON: usize = 8;
@@ -45,7 +45,7 @@ impl Relaxation {
         let ln_z = at.0.ln() - ln_y_steady;
         // NaN, where there is no steady state.
         let distance = ln_z.abs() * stretch;
-        if distance.is_nan() || distance >= FARTHEST {
+        if distance.is_nan() || distance >= FARTHEST_DISTANCE {
             return None;
         }
         let (z, u) = series(law.p, order);

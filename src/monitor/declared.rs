@@ -65,7 +65,7 @@ impl Declaration {
 }
 
 /// A reset that is declared so near to one that was found is the same.
-const NEAR: SignedDuration = SignedDuration::from_hours(48);
+const NEAR_SPAN: SignedDuration = SignedDuration::from_hours(48);
 
 /// What is declared for one benchmark.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -121,7 +121,8 @@ impl Declarations {
             let mut resets = self.all.iter();
             resets.any(|one| {
                 let before = time.duration_since(one.time);
-                matches!(one.kind, Declaration::Reset { .. }) && (-NEAR..=NEAR).contains(&before)
+                matches!(one.kind, Declaration::Reset { .. })
+                    && (-NEAR_SPAN..=NEAR_SPAN).contains(&before)
             })
         };
         // What was found, and is declared now, is taken off once.

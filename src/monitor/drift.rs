@@ -6,7 +6,7 @@ use crate::model::{Accuracy, Law, Trajectory};
 use serde::{Deserialize, Serialize};
 
 /// Refits before anything is announced.
-const FEWEST: usize = 5;
+const FEWEST_REFITS: usize = 5;
 
 /// Refits in a row that must agree that it moved.
 const AGREEING: u32 = 3;
@@ -48,7 +48,7 @@ impl Drift {
             return None;
         };
         self.refits += 1;
-        if self.refits < FEWEST {
+        if self.refits < FEWEST_REFITS {
             return None;
         }
         let Some((since, from_days)) = self.announced else {

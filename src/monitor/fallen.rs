@@ -11,11 +11,11 @@ use crate::reading::{Quantity, Timestamp};
 const CONFIRMING: usize = 4;
 /// The readings, the newest, from which the usual step is learnt; fewer than the least show nothing.
 const INSPECTED: usize = 200;
-const FEWEST: usize = 16;
+const FEWEST_READINGS: usize = 16;
 /// A fall is larger than so many times the usual scatter of a step. Of normal noise none is in a lifetime of readings.
 const LEAP: f64 = 12.0;
 /// The readings on either side lie within this share of the fall of one another.
-const APART: f64 = 0.25;
+const APART_SHARE: f64 = 0.25;
 /// What was taken for a reset may come back within this time, days; later a jump as large is motion,
 const LONGEST_OFFSET_DAYS: f64 = 30.0;
 /// and so it is where the readings before it moved by more than this share of it.
@@ -27,7 +27,7 @@ impl History {
     pub(super) fn fallen_back(&self) -> Option<(Timestamp, f64)> {
         let values = &self.observations.values;
         let at = values.len().checked_sub(CONFIRMING)?;
-        if self.observations.quantity != Quantity::Displacement || at < FEWEST {
+        if self.observations.quantity != Quantity::Displacement || at < FEWEST_READINGS {
             return None;
         }
         let from = at.saturating_sub(INSPECTED);
@@ -43,7 +43,7 @@ impl History {
             .map(|pair| pair[1].value - pair[0].value);
         let (_, scatter) = scatter_of(&steps.collect::<Vec<f64>>())?;
         let has_come_forward = values[at - 1].value - values[from].value >= -LEAP * scatter;
-        let is_level = |of: &[Observation]| spread(of) <= APART * fall;
+        let is_level = |of: &[Observation]| spread(of) <= APART_SHARE * fall;
         if fall < LEAP * scatter || !has_come_forward || !is_level(before) || !is_level(after) {
             return None;
         }
@@ -69,7 +69,7 @@ impl History {
         let step = newest.value - before[CONFIRMING - 1].value;
         let is_still = spread(before) <= STILL * step;
         let age = newest.t_days - self.days(time);
-        is_still && (step + jump).abs() <= APART * jump.abs() && age <= LONGEST_OFFSET_DAYS
+        is_still && (step + jump).abs() <= APART_SHARE * jump.abs() && age <= LONGEST_OFFSET_DAYS
     }
 }
 

@@ -13,7 +13,7 @@ const SETTLED: usize = 5;
 /// Readings are looked at no further back than this for how they scatter.
 const LOOKED_AT: usize = 512;
 /// A mean that stands clear of zero does so by so many standard errors.
-const CLEAR: f64 = 4.0;
+const CLEAR_ERRORS: f64 = 4.0;
 /// The error that the first readings may have, mm, and how many times that is taken off their motion.
 const FIRST_ERROR_MM: f64 = 20.0;
 const FIRST_ERRORS: f64 = 6.0;
@@ -92,7 +92,7 @@ fn moved_at_least(observations: &Observations, days: f64) -> f64 {
             (sum / count, velocity_sigma(looked_at) / count.sqrt())
         }
     };
-    (mean.abs() - CLEAR * error).max(0.0)
+    (mean.abs() - CLEAR_ERRORS * error).max(0.0)
 }
 
 /// The highest settled velocity, mm/day.

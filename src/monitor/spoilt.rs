@@ -15,7 +15,7 @@ const STEPS: f64 = 20.0;
 const SPOILT: f64 = 0.26;
 /// The share of turns, where a jump follows one the other way. Of noise alone no step is so large.
 const TURNING: f64 = 0.25;
-const FEWEST: usize = 5;
+const FEWEST_FOUND: usize = 5;
 /// Once they were spoilt by so much, spikes and jumps count from this share of it, and half as many are enough.
 const STILL: f64 = 1.0 / 3.0;
 const FEWER: f64 = 0.5;
@@ -253,7 +253,7 @@ fn nth_largest(sizes: &[f64], before: usize) -> Option<f64> {
 
 /// From how many spikes or turns on this share of them among the `latest` readings is many.
 fn many(latest: &[Observation], share: f64) -> f64 {
-    (share * (latest.len() - 2) as f64).max(FEWEST as f64)
+    (share * (latest.len() - 2) as f64).max(FEWEST_FOUND as f64)
 }
 
 /// The least that a reading differs by from one of the next two, where it does.

@@ -21,7 +21,7 @@ const MOST_COMPARED: usize = 12;
 /// Comparisons that are remembered: an agreement is judged over those of late.
 const MOST_KEPT: usize = 6;
 /// Between two comparisons, unless a level changes, in evacuation times.
-const APART: f64 = 0.125;
+const APART_EVACUATIONS: f64 = 0.125;
 /// A forecast older than so many evacuation times says nothing of now.
 const STALE: f64 = 2.0;
 /// A median is reported again when it has moved by this share of the time that was left.
@@ -49,7 +49,7 @@ impl FailureComparisons {
     ) -> Option<Event> {
         let evacuation_days = days_of(policy.evacuation_time);
         let newest = self.kept.last().map(|(time, _)| days_since(*time, now));
-        if !has_changed && newest.is_some_and(|ago| ago < APART * evacuation_days) {
+        if !has_changed && newest.is_some_and(|ago| ago < APART_EVACUATIONS * evacuation_days) {
             return None;
         }
         let compared = compared(in_force, tracks, now, STALE * evacuation_days);
@@ -63,7 +63,7 @@ impl FailureComparisons {
         });
         let forecasts = forecasts.collect();
         // Of what changes at one moment the newest is kept: an agreement is judged over the forecasts of some time.
-        if newest.is_some_and(|ago| ago < APART * evacuation_days) {
+        if newest.is_some_and(|ago| ago < APART_EVACUATIONS * evacuation_days) {
             self.kept.pop();
         }
         self.kept.push((now, forecasts));

@@ -42,7 +42,7 @@ const DAYS_PER_MONTH: f64 = 30.44;
 /// Room between two labels, in the sheet's units.
 const GAP: f64 = 18.0;
 /// No sheet holds more labels.
-const MOST: i32 = 60;
+const MOST_LABELS: i32 = 60;
 
 /// Ticks between two days since 1970-01-01, on an axis of `length` units of the sheet.
 pub(super) fn ticks(from: f64, to: f64, length: f64) -> Vec<(f64, String)> {
@@ -77,7 +77,7 @@ impl CalendarStep {
     }
 
     fn ticks(self, from: f64, to: f64) -> Vec<(f64, String)> {
-        let numbered = (0..MOST).map(f64::from);
+        let numbered = (0..MOST_LABELS).map(f64::from);
         match self {
             Self::Minutes(_) | Self::Days(_) => {
                 let step = self.days();

@@ -13,7 +13,7 @@ const OF_VELOCITIES: [f64; 4] = [10.0, 24.0, 100.0, 1000.0];
 const LEAST_RATIO: f64 = 4.0;
 /// The readings before the change from which their usual step is learnt; fewer than the least show nothing.
 const INSPECTED: usize = 48;
-const FEWEST: usize = 16;
+const FEWEST_READINGS: usize = 16;
 /// Displacements that far from zero, in their scatter, show a change of the unit by their values.
 const FAR: f64 = 12.0;
 /// What goes on from the readings before lies within so many times their scatter. Of normal noise nearly all does,
@@ -29,7 +29,7 @@ const SCATTERS: f64 = 0.5;
 /// So many readings back in the former unit, in a row, end it,
 const BACK: u32 = 4;
 /// which are those within this share of what the last one in the other unit was in the former.
-const NEAR: f64 = 0.5;
+const NEAR_SHARE: f64 = 0.5;
 /// So many readings that range over a hundredth, say, of what the former ones did show it too, where these lie too near to zero for their
 /// values to: the quietest so many of the [`INSPECTED`] are compared with them.
 const QUIET: usize = 16;
@@ -164,7 +164,7 @@ impl OtherUnit {
     ) -> Option<Self> {
         let before = &before[before.len().saturating_sub(INSPECTED)..];
         let (last, first) = (before.last()?, after.first()?);
-        if before.len() < FEWEST || !may_have_changed(&[*last, *first]) {
+        if before.len() < FEWEST_READINGS || !may_have_changed(&[*last, *first]) {
             return None;
         }
         let steps: Vec<f64> = before
@@ -245,7 +245,7 @@ impl OtherUnit {
     pub fn goes_on(&mut self, value: f64) -> bool {
         let as_before = self.factor * self.newest;
         let off = (value - as_before).abs();
-        if off < NEAR * as_before.abs() && off < (value - self.newest).abs() {
+        if off < NEAR_SHARE * as_before.abs() && off < (value - self.newest).abs() {
             self.back += 1;
         } else {
             (self.back, self.newest) = (0, value);

@@ -21,7 +21,7 @@ const AWAY: f64 = 5.0;
 /// A step of so many times the usual scatter of a step.
 const LEAP: f64 = 50.0;
 /// Fewer readings show nothing.
-const FEWEST: usize = 10;
+const FEWEST_READINGS: usize = 10;
 /// Fewer readings show nothing of their unit.
 const FEWEST_OF_SCALE: usize = 24;
 /// A slope of which all readings lie within so many mm, and are given to a thousandth of one, may be in m,
@@ -125,7 +125,7 @@ pub fn like_a_zone(ahead: SignedDuration) -> Option<String> {
 /// Whether readings of these values give no rise to any suspicion, as far as it can be known without sorting them; what
 /// comes with each new reading is to cost little.
 pub fn is_plain(values: &[f64], quantity: Quantity, unit: &str) -> bool {
-    if values.len() < FEWEST {
+    if values.len() < FEWEST_READINGS {
         return true;
     }
     let (low, high) = ends(values);
@@ -230,7 +230,7 @@ pub fn of_values(
 ) -> Vec<DatedSuspicion> {
     let mut readings = readings.to_vec();
     let mut found = Vec::new();
-    if readings.len() < FEWEST {
+    if readings.len() < FEWEST_READINGS {
         return found;
     }
     if let Some((value, evidence)) = mark(&readings) {
@@ -289,7 +289,7 @@ fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, DatedSuspicion)> {
 
 /// The number in the values of a covariate, in order of time, that marks no value elsewhere, and the evidence for that.
 pub fn mark_in(values: &[(Timestamp, f64)]) -> Option<(f64, String)> {
-    if values.len() < FEWEST {
+    if values.len() < FEWEST_READINGS {
         return None;
     }
     let (value, evidence) = mark(values)?;
@@ -314,7 +314,11 @@ fn scatter(readings: &[(Timestamp, f64)]) -> Option<(f64, f64)> {
 pub fn scatter_of(steps: &[f64]) -> Option<(f64, f64)> {
     let moved: Vec<f64> = steps.iter().copied().filter(|step| *step != 0.0).collect();
     let usual = median(steps.iter().copied())?;
-    let steps = if moved.len() < FEWEST { steps } else { &moved };
+    let steps = if moved.len() < FEWEST_READINGS {
+        steps
+    } else {
+        &moved
+    };
     let scatter = 1.4826 * median(steps.iter().map(|step| (step - usual).abs()))?;
     let scatter = scatter.max(median(steps.iter().map(|step| step.abs()))?);
     (scatter > 0.0).then_some((usual, scatter))

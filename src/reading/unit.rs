@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::fmt;
 
 /// No displacement in mm is larger, a coordinate of a map projection neither: a hundred thousand kilometres.
-const FARTHEST: f64 = 1e11;
+const FARTHEST_MM: f64 = 1e11;
 /// No velocity in mm/day is larger: a thousand kilometres a day.
 const FASTEST: f64 = 1e9;
 
@@ -34,7 +34,7 @@ impl Quantity {
     /// No reading of it is larger, mm or mm/day.
     pub fn farthest(self) -> f64 {
         match self {
-            Self::Displacement => FARTHEST,
+            Self::Displacement => FARTHEST_MM,
             Self::Velocity => FASTEST,
         }
     }

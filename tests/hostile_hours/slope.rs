@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 
 /// Red is due where so many readings in a row have shown this velocity, which is four times the threshold.
 pub(crate) const CRISIS_MM_PER_DAY: f64 = 400.0;
-pub(crate) const FEWEST: usize = 4;
+pub(crate) const FEWEST_IN_A_ROW: usize = 4;
 
 /// One reading, as a logger has it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,7 +84,7 @@ impl Slope {
             measured.push(Measured {
                 time,
                 value: ((self.value + noise) * 1000.0).round() / 1000.0,
-                calls_red: self.in_a_row == FEWEST,
+                calls_red: self.in_a_row == FEWEST_IN_A_ROW,
                 is_of_a_crisis,
             });
         }

@@ -103,7 +103,7 @@ fn the_zero_of_the_displacement_and_of_time_change_nothing() {
 #[test]
 fn a_newest_reading_moved_within_its_noise_moves_the_chances_of_the_levels_by_bounded_odds() {
     // ln of the odds, a standard deviation of the noise.
-    const MOST: f64 = 4.0;
+    const MOST_LN_ODDS: f64 = 4.0;
     for until in [12.0, 22.0, 25.0, 27.0, 29.0] {
         let readings = failing(1.0 / 24.0, until);
         let mut before: Option<Vec<f64>> = None;
@@ -118,7 +118,10 @@ fn a_newest_reading_moved_within_its_noise_moves_the_chances_of_the_levels_by_bo
             if let Some(before) = before {
                 let pairs = odds.iter().zip(&before);
                 let most = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-                assert!(most < 0.25 * MOST, "day {until}, step {step}: {most}");
+                assert!(
+                    most < 0.25 * MOST_LN_ODDS,
+                    "day {until}, step {step}: {most}"
+                );
             }
             before = Some(odds.to_vec());
         }

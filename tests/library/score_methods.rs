@@ -11,7 +11,7 @@ use studies::{Fate, Life};
 /// Where a record is looked at, tenths of its readings.
 const LOOKS: [usize; 3] = [2, 6, 9];
 /// Readings kept of a recording: what is shown does not need more.
-const MOST: usize = 240;
+const MOST_READINGS: usize = 240;
 
 fn of_life(fate: Fate, seed: u64) -> WholeRecord {
     let life = Life::draw(fate, seed);
@@ -34,7 +34,7 @@ fn recorded(name: &str) -> Vec<WholeRecord> {
     let series = recording.series.iter().map(|series| {
         let epoch = series.readings[0].time;
         let mut observations = Observations::of(series);
-        observations.values.truncate(MOST);
+        observations.values.truncate(MOST_READINGS);
         let samples = recording.channels.first().map(|channel| &channel.samples);
         let flow = samples.into_iter().flatten();
         WholeRecord {

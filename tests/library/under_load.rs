@@ -212,7 +212,7 @@ fn a_compacted_record_foretells_what_the_whole_one_does() {
             kept.values.push(*value);
             kept.compact();
         }
-        assert!(kept.values.len() <= Observations::MOST && whole.values.len() > 2400);
+        assert!(kept.values.len() <= Observations::MOST_READINGS && whole.values.len() > 2400);
         let median = |observations: &Observations| {
             let outlook = LawForecaster::default()
                 .update(observations, CRITICAL)
@@ -293,7 +293,9 @@ fn readings_by_the_second_crowd_out_neither_the_record_nor_the_forecast() {
         });
         kept.compact();
     }
-    assert!(kept.values.len() <= Observations::MOST + 1 && start < Observations::MOST);
+    assert!(
+        kept.values.len() <= Observations::MOST_READINGS + 1 && start < Observations::MOST_READINGS
+    );
     assert!(
         kept.values
             .iter()

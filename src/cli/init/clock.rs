@@ -5,7 +5,7 @@ use crate::reading::{Timestamp, bracketed};
 use jiff::tz::TimeZone;
 
 /// Fewer times show nothing.
-const FEWEST: usize = 10;
+const FEWEST_TIMES: usize = 10;
 /// Of the steps from one time to the next, one in so many goes back where a clock shows each hour twice.
 const ONE_IN: usize = 20;
 
@@ -16,7 +16,7 @@ pub(super) fn of_twelve_hours(times: &[Timestamp], pattern: &str) -> Option<Stri
     let (low, high) = hours.fold((i8::MAX, i8::MIN), |(low, high), hour| {
         (low.min(hour), high.max(hour))
     });
-    if times.len() < FEWEST || low < 1 || high > 12 {
+    if times.len() < FEWEST_TIMES || low < 1 || high > 12 {
         return None;
     }
     let steps = || times.windows(2).map(|pair| pair[1].cmp(&pair[0]));

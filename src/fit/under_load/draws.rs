@@ -3,7 +3,7 @@
 use super::assumptions::Assumptions;
 use super::population::{DrawnLaw, Population};
 use super::search::GridSearch;
-use super::{Ensemble, FEWEST, LawSample};
+use super::{Ensemble, FEWEST_RATES, LawSample};
 use crate::fit::Rate;
 use crate::model::Law;
 use std::collections::BTreeSet;
@@ -63,7 +63,7 @@ impl LawDraws {
     pub fn with(rates: &[Rate], assumed: &Assumptions, likely: &[Law]) -> Option<Self> {
         let (first, last) = (rates.first()?, rates.last()?);
         let moves = rates.iter().any(|rate| rate.velocity > 0.0);
-        if rates.len() < FEWEST || !moves || last.to <= first.from {
+        if rates.len() < FEWEST_RATES || !moves || last.to <= first.from {
             return None;
         }
         let mut search = GridSearch::new(rates, assumed);

@@ -55,7 +55,7 @@ use shape::Shape;
 use std::collections::BTreeMap;
 
 /// Fewest rates.
-const FEWEST: usize = 5;
+const FEWEST_RATES: usize = 5;
 /// The heaviest laws, by which a next reading is predicted.
 const HEAVIEST: usize = 64;
 
@@ -123,7 +123,7 @@ impl LoadPosterior {
     /// Fits `rates`, oldest first; `None` with fewer than five, or where none of them moves.
     pub fn fit(rates: &[Rate]) -> Option<Self> {
         let moves = rates.iter().any(|rate| rate.velocity > 0.0);
-        if rates.len() < FEWEST || !moves {
+        if rates.len() < FEWEST_RATES || !moves {
             return None;
         }
         let mut search = GridSearch::new(rates, &Assumptions::CHANGING_LOAD);

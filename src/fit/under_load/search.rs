@@ -18,8 +18,11 @@ const MEMORIES: [f64; 3] = [0.02, 0.08, 0.32];
 /// Steps of ln r: in the coarse pass, and how many of the fine one make one of them.
 const COARSE_STEP: f64 = 0.45;
 const FINER: usize = 2;
-/// Most slopes of the coarse and of the fine pass, and most noises of the fine one.
-const MOST: (usize, usize, usize) = (40, 32, 5);
+/// Most slopes of the coarse pass.
+const MOST_COARSE_SLOPES: usize = 40;
+/// Most slopes of the fine pass, and most noises.
+const MOST_FINE_SLOPES: usize = 32;
+const MOST_NOISES: usize = 5;
 /// What is this much less likely than the best, ln: shapes and slopes left out of the fine pass, noises
 /// left out, and cells left out of the answer.
 const LEFT_OUT: (f64, f64, f64) = (8.0, 4.0, 9.0);
@@ -68,7 +71,7 @@ impl GridSearch {
             befores: BTreeMap::new(),
             record,
             prior,
-            coarse: coarse.clamp(4, MOST.0),
+            coarse: coarse.clamp(4, MOST_COARSE_SLOPES),
             room: Room::default(),
         }
     }
@@ -216,14 +219,14 @@ impl GridSearch {
             let share = (index / self.coarse as f64).clamp(0.0, 1.0);
             self.prior.lowest * (self.prior.highest / self.prior.lowest).powf(share)
         };
-        let count = ((last - first + 3) * FINER).min(MOST.1);
+        let count = ((last - first + 3) * FINER).min(MOST_FINE_SLOPES);
         let range = (at(first as f64 - 1.0), at(last as f64 + 2.0));
         let slopes = self.slopes(range, count, &blocks);
         let likeliest = (best - first + 1) * count / (last - first + 3);
         let likely = noises[0].ln_evidence - LEFT_OUT.1;
         let likely = noises.iter().take_while(|noise| noise.ln_evidence > likely);
         let (mut cells, mut heaviest) = (Vec::new(), f64::NEG_INFINITY);
-        for (rank, noise) in likely.take(MOST.2).enumerate() {
+        for (rank, noise) in likely.take(MOST_NOISES).enumerate() {
             let memory = LoadMemory::new(&self.record, noise);
             for index in outwards(slopes.len(), likeliest) {
                 let slope = &slopes[index];

@@ -23,7 +23,7 @@ use crate::score::Known;
 use nalgebra::{Matrix4, Vector4};
 
 /// Points in a window, at least twice the seven unknowns.
-const FEWEST: usize = 14;
+const FEWEST_POINTS: usize = 14;
 /// The newest shares of the record that are fitted.
 const WINDOWS: [f64; 5] = [1.0, 0.8, 0.64, 0.51, 0.41];
 /// Where the search begins: time left over the window's length, m, omega.
@@ -50,7 +50,7 @@ const UNRESOLVED: f64 = 1e-9;
 /// The singularities of the windows that qualify.
 pub(in crate::score) fn forecast(known: &Known) -> Option<Passage> {
     let path = displacements(&rates(known));
-    if path.len() < FEWEST {
+    if path.len() < FEWEST_POINTS {
         return None;
     }
     let newest = path.last()?.0;
@@ -87,7 +87,7 @@ impl FitWindow {
             reason = "a share of a count"
         )]
         let count = (part * path.len() as f64) as usize;
-        let kept = &path[path.len() - count.max(FEWEST)..];
+        let kept = &path[path.len() - count.max(FEWEST_POINTS)..];
         let (&(start, from), &(end, to)) = (kept.first()?, kept.last()?);
         let (length_days, moved) = (end - start, to - from);
         let is_usable = |size: f64| size.is_normal() && size > 0.0;

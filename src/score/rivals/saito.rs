@@ -13,13 +13,13 @@ use crate::forecast::Passage;
 use crate::score::Known;
 
 /// Velocities since the onset, at least: two halves of a displacement from fewer are one step of the record.
-const FEWEST: usize = 4;
+const FEWEST_VELOCITIES: usize = 4;
 
 /// The failure by three points since the onset of acceleration.
 pub(in crate::score) fn forecast(known: &Known) -> Option<Passage> {
     let rates = rates(known);
     onset::from_onset(&rates, |since| {
-        if rates.len() - since < FEWEST {
+        if rates.len() - since < FEWEST_VELOCITIES {
             return None;
         }
         let path = displacements(&rates);

@@ -15,7 +15,7 @@ use crate::forecast::Passage;
 use crate::score::Known;
 
 /// Fewer velocities than this leave nothing over from three unknowns.
-const FEWEST: usize = 5;
+const FEWEST_VELOCITIES: usize = 5;
 /// alpha is near 2 wherever it has been measured.
 const ALPHA: (f64, f64) = (1.0, 5.0);
 const ALPHAS: [f64; 4] = [1.2, 1.7, 2.2, 3.0];
@@ -59,7 +59,7 @@ impl Velocities {
             .map(|rate| (rate.middle() - newest, rate.velocity.ln()))
             .collect();
         let span = -points.first()?.0;
-        (points.len() >= FEWEST && span > 0.0).then_some(Self { points, span })
+        (points.len() >= FEWEST_VELOCITIES && span > 0.0).then_some(Self { points, span })
     }
 
     fn fit(&self) -> Relation {

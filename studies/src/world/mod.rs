@@ -196,7 +196,7 @@ impl Simulated {
 
     /// `None` where the instrument could not see the motion that is drawn.
     fn attempt(family: Family, generator: &mut Pcg64) -> Option<Self> {
-        const FEWEST: usize = 14;
+        const FEWEST_READINGS: usize = 14;
         let gauge = Gauge::draw(family, generator);
         let course = Course::draw(family, &gauge, generator)?;
         let path = onward::path(&course, family, gauge.interval, generator);
@@ -215,7 +215,7 @@ impl Simulated {
             visible_days: visible_days.max(begins),
             ..Self::of(family, (&gauge, &course), readings, begins)
         };
-        (drawn.observations.values.len() >= FEWEST).then_some(drawn)
+        (drawn.observations.values.len() >= FEWEST_READINGS).then_some(drawn)
     }
 
     /// The readings of `course` by `gauge`, from `begins` days on.

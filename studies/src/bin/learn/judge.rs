@@ -29,7 +29,7 @@ pub(crate) const CHANCES: [f64; 6] = [0.15, 0.2, 0.27, 0.35, 0.45, 0.6];
 const A_DAY: usize = 1;
 /// Levels stay: another entry within so many days is the same alarm.
 const SAME_ALARM_DAYS: f64 = 3.0;
-pub(crate) const FEWEST: usize = 12;
+pub(crate) const FEWEST_READINGS: usize = 12;
 /// Readings of a life that are looked at, at most.
 const MOST_ASKED: usize = 1500;
 
@@ -286,7 +286,7 @@ fn replay(slope: &Simulated, network: &Network, most_asked: usize) -> Replay {
         CHANCES.map(|red_chance| (Calls::with(A_DAY, red_chance), Alarms::default()));
     let (mut orange, mut all_years) = (Alarms::default(), 0.0);
     let step = values.len().div_ceil(most_asked);
-    for count in (FEWEST..=values.len()).step_by(step) {
+    for count in (FEWEST_READINGS..=values.len()).step_by(step) {
         let Some(chances) = Chances::of(&first(&slope.observations, count), network) else {
             continue;
         };

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use studies::{Family, Simulated};
 
 /// Fewest readings before a look.
-const FEWEST: usize = 12;
+const FEWEST_READINGS: usize = 12;
 /// Looks before the end of an acceleration, after one that stopped, and anywhere in a life.
 const BEFORE: usize = 6;
 const AFTER: usize = 2;
@@ -126,7 +126,7 @@ fn weight(family: Family) -> f32 {
 
 fn at(slope: &Simulated, seed: u64) -> Vec<Look> {
     let values = &slope.observations.values;
-    if values.len() <= FEWEST {
+    if values.len() <= FEWEST_READINGS {
         return Vec::new();
     }
     let mut generator = Pcg64::seed_from_u64(seed ^ 0x5555);
@@ -134,7 +134,7 @@ fn at(slope: &Simulated, seed: u64) -> Vec<Look> {
     if let Some(end) = slope.collapse_days.or(slope.stopped_days) {
         counts.extend(about(slope, (end, LAST_LOOK.0), &mut generator));
     }
-    let mut anywhere = || generator.random_range(FEWEST..=values.len());
+    let mut anywhere = || generator.random_range(FEWEST_READINGS..=values.len());
     counts.extend((0..ANYWHERE).map(|_| anywhere()));
     let mut likely: Vec<(f64, usize)> = (0..LIKELIEST.0)
         .filter_map(|_| {
@@ -166,7 +166,7 @@ fn about(slope: &Simulated, (end, intervals): (f64, f64), generator: &mut impl R
     let counts = times
         .iter()
         .map(|days| values.partition_point(|value| value.t_days <= *days));
-    counts.filter(|count| *count >= FEWEST).collect()
+    counts.filter(|count| *count >= FEWEST_READINGS).collect()
 }
 
 /// Counts of readings before the end of a slope that judges.
@@ -187,11 +187,13 @@ fn newest(observations: &Observations, (seed, count): (u64, usize)) -> Observati
     let mut known = first(observations, count);
     let index = seed.wrapping_mul(0x9E37_79B9).wrapping_add(count as u64);
     let mut generator = Pcg64::seed_from_u64(index);
-    if generator.random::<f64>() < CUT && count > FEWEST {
-        let share = (FEWEST as f64 / count as f64).powf(generator.random::<f64>());
+    if generator.random::<f64>() < CUT && count > FEWEST_READINGS {
+        let share = (FEWEST_READINGS as f64 / count as f64).powf(generator.random::<f64>());
         #[expect(clippy::cast_sign_loss, reason = "a share of a count")]
         let kept = (share * count as f64).round() as usize;
-        known.values.drain(..count - kept.clamp(FEWEST, count));
+        known
+            .values
+            .drain(..count - kept.clamp(FEWEST_READINGS, count));
     }
     known
 }
@@ -225,7 +227,7 @@ pub(crate) fn of_standing(slopes: u64) -> Vec<Look> {
     in_two(&jobs, |(family, seed)| {
         let slope = Simulated::draw(*family, *seed);
         let all = slope.observations.values.len();
-        let asked = (FEWEST..=all).step_by((all / ASKED.1).max(1));
+        let asked = (FEWEST_READINGS..=all).step_by((all / ASKED.1).max(1));
         let looks = asked.filter_map(|count| look(&slope, *seed, count));
         looks.collect()
     })

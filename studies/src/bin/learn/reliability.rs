@@ -1,6 +1,6 @@
 //! Whether chances come true: of looks evenly over each life, what was said and what came.
 
-use crate::judge::FEWEST;
+use crate::judge::FEWEST_READINGS;
 use crate::looks::{first, in_two};
 use crate::source;
 use slipwatch::forecast::{Collapse, Indicators, Members, Network, Passage};
@@ -51,8 +51,8 @@ pub(crate) fn section(slopes: u64) -> anyhow::Result<String> {
 
 fn looks(slope: &Simulated, network: &Network) -> Vec<Said> {
     let values = &slope.observations.values;
-    let after = values.len().saturating_sub(FEWEST);
-    let counts = (0..LOOKS).map(|look| FEWEST + after * look / LOOKS);
+    let after = values.len().saturating_sub(FEWEST_READINGS);
+    let counts = (0..LOOKS).map(|look| FEWEST_READINGS + after * look / LOOKS);
     let said = counts.filter_map(|count| {
         let seen = first(&slope.observations, count);
         let now_days = seen.values.last()?.t_days;

@@ -1,6 +1,6 @@
 //! docs/steady-creep.md: steady creep, and a rate that doubles and stays, as loggers read them.
 
-use crate::judge::{Calls, Chances, FEWEST};
+use crate::judge::{Calls, Chances, FEWEST_READINGS};
 use crate::looks::{first, in_two};
 use crate::source;
 use rand::{Rng, RngExt, SeedableRng};
@@ -116,7 +116,7 @@ fn follow(seed: u64, doubles: bool, network: &Network) -> Called {
         (0.0, 0.0)
     };
     let begin = values.partition_point(|value| value.t_days < from);
-    let begin = begin.max(FEWEST);
+    let begin = begin.max(FEWEST_READINGS);
     let step = values.len().saturating_sub(begin).div_ceil(JUDGED).max(1);
     let mut called = Called {
         noise,

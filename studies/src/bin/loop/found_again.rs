@@ -6,7 +6,7 @@ use slipwatch::effects::{Effect, Explanation, FaultKind, Kind, Options, explain}
 use slipwatch::reading::{Channel, Series, days_since};
 
 /// An event is found where it is dated within so many of the usual intervals between readings.
-const NEAR: f64 = 3.0;
+const NEAR_INTERVALS: f64 = 3.0;
 /// A wave that the readings had before is found where it is said to be so many times as large as before.
 const LARGER: f64 = 3.0;
 
@@ -112,7 +112,7 @@ impl Trial {
         });
         let off = |found: &Found| found.late_days.unwrap_or(0.0).abs();
         said.chain(faults)
-            .filter(|found| off(found) <= NEAR * self.interval_days)
+            .filter(|found| off(found) <= NEAR_INTERVALS * self.interval_days)
             .min_by(|one, other| off(one).total_cmp(&off(other)))
     }
 }

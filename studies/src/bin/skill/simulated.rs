@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 /// A forecast is near where its median lies within this share of the time that remains.
-const NEAR: f64 = 0.2;
+const NEAR_SHARE: f64 = 0.2;
 
 /// Whether a record is one of the leads that methods are compared at.
 pub(crate) fn is_at_a_lead(record: &Record) -> bool {
@@ -124,7 +124,7 @@ fn others(out: &mut String, scored: &Scored) {
         out,
         "\nShare of forecasts whose median lies within {:.0} % of the time that remained, and the prognostic horizon: the longest lead \
          from which on every shorter one of these was so near, median over slopes, days (0: the last one was not):",
-        100.0 * NEAR
+        100.0 * NEAR_SHARE
     );
     let row = |name: &&'static str| {
         let mut row = vec![(*name).to_owned()];
@@ -161,7 +161,7 @@ fn bias(scored: &Scored, name: &str, lead: f64) -> String {
 }
 
 fn is_near(record: &Record) -> Option<bool> {
-    Some(error_days(record)?.abs() <= NEAR * record.remaining_days()?)
+    Some(error_days(record)?.abs() <= NEAR_SHARE * record.remaining_days()?)
 }
 
 fn share_near(scored: &Scored, name: &str, lead: f64) -> Option<f64> {
