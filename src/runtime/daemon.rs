@@ -10,7 +10,7 @@ use super::delivered::Delivered;
 use super::log;
 use super::mqtt;
 use super::progress::Progress;
-use super::pulse::Reporting;
+use super::reporting::Reporting;
 use super::sandbox;
 use super::service_faults::{ServiceFault, ServiceFaults};
 use super::shutdown::Shutdown;
@@ -51,7 +51,7 @@ pub struct Daemon {
     /// What feeds it.
     pub sources: Sources,
     /// What shows how it is.
-    pub pulse: Reporting,
+    pub reporting: Reporting,
     /// The host's clock.
     host_time: fn() -> Timestamp,
     /// Once, and as of the last batch: a logger that was away hands in its backlog in several.
@@ -96,7 +96,7 @@ impl Daemon {
         store: Arc<Store>,
         site: Site,
         sources: Sources,
-        pulse: Reporting,
+        reporting: Reporting,
         host_time: fn() -> Timestamp,
     ) -> Self {
         Self {
@@ -105,7 +105,7 @@ impl Daemon {
             store,
             site,
             sources,
-            pulse,
+            reporting,
             host_time,
             is_caught_up: false,
             is_up_to_date: false,
@@ -133,7 +133,7 @@ impl Daemon {
         self.keep_faults();
         let (mut tick, mut asked) = (Self::ticks(), shutdown.clone());
         loop {
-            self.pulse.turn();
+            self.reporting.turn();
             tokio::select! {
                 biased;
                 () = asked.requested() => return Ok(()),
@@ -194,7 +194,7 @@ impl Daemon {
         batch: ArrivalBatch,
         shutdown: &Shutdown,
     ) -> Result<(), StoreError> {
-        let vitals = &self.pulse.vitals;
+        let vitals = &self.reporting.vitals;
         batch
             .found
             .into_iter()
@@ -224,7 +224,7 @@ impl Daemon {
             self.decide();
         } else {
             let events = self.site.judge_meanwhile();
-            self.pulse.vitals.note(&events);
+            self.reporting.vitals.note(&events);
         }
         self.release()?;
         self.end_batch()?;
@@ -248,12 +248,12 @@ impl Daemon {
         }
         let stopwatch = Stopwatch::start();
         let events = self.site.caught_up((self.host_time)())?;
-        self.pulse.vitals.judged(&events, stopwatch.elapsed());
+        self.reporting.vitals.judged(&events, stopwatch.elapsed());
         if !self.is_caught_up {
             self.is_caught_up = true;
-            self.pulse.caught_up();
+            self.reporting.caught_up();
             let counts = self.site.counts();
-            let quarantined: u64 = self.pulse.vitals.health().quarantined.values().sum();
+            let quarantined: u64 = self.reporting.vitals.health().quarantined.values().sum();
             tracing::info!(
                 taken = counts.taken,
                 repeated = counts.repeated,
@@ -278,7 +278,7 @@ impl Daemon {
             self.site
                 .messages_come(self.sources.deliveries.len() + waiting.len());
             self.site.queue();
-            let vitals = &self.pulse.vitals;
+            let vitals = &self.reporting.vitals;
             vitals.takes(delivery.found);
             vitals.quarantined(&delivery.source, delivery.quarantined);
             if prepared == 0 {
@@ -312,7 +312,7 @@ impl Daemon {
     /// Takes what was held for the clock; what files say of their positions counts once nothing is held.
     fn release(&mut self) -> Result<(), StoreError> {
         let events = self.site.release((self.host_time)())?;
-        self.pulse.vitals.note(&events);
+        self.reporting.vitals.note(&events);
         if self.holds_nothing() {
             let positions = std::mem::take(&mut self.positions);
             self.site.note_positions(positions);
@@ -325,7 +325,7 @@ impl Daemon {
     /// All that came together has been seen.
     fn decide(&mut self) {
         let events = self.site.decide((self.host_time)());
-        self.pulse.vitals.note(&events);
+        self.reporting.vitals.note(&events);
     }
 
     /// Whether all that was read has been taken, or is known not to count.
@@ -338,12 +338,12 @@ impl Daemon {
         loop {
             let stopwatch = Stopwatch::start();
             let events = self.site.end_batch();
-            self.pulse.vitals.judged(&events, stopwatch.elapsed());
+            self.reporting.vitals.judged(&events, stopwatch.elapsed());
             if !self.site.queues() {
                 return Ok(());
             }
             self.commit_what_is_urgent()?;
-            self.pulse.turn();
+            self.reporting.turn();
         }
     }
 
@@ -359,7 +359,7 @@ impl Daemon {
     pub fn look_back(&mut self) -> Result<(), StoreError> {
         let (stopwatch, owed_past) = (Stopwatch::start(), self.site.owes_past());
         let events = self.site.look_back();
-        self.pulse.vitals.judged(&events, stopwatch.elapsed());
+        self.reporting.vitals.judged(&events, stopwatch.elapsed());
         if owed_past && !self.site.owes_past() {
             tracing::info!("the history before the first start has been judged");
         }
@@ -370,14 +370,14 @@ impl Daemon {
         let stopwatch = Stopwatch::start();
         let taken = self.site.counts().taken;
         let events = self.site.take(arrival, (self.host_time)())?;
-        let vitals = &self.pulse.vitals;
+        let vitals = &self.reporting.vitals;
         let is_taken = self.site.counts().taken > taken;
         if is_taken && let Input::Reading { benchmark, .. } = &arrival.input {
             vitals.read(benchmark, arrival.time, &events, stopwatch.elapsed());
         } else {
             vitals.note(&events);
         }
-        self.pulse.turn();
+        self.reporting.turn();
         Ok(())
     }
 
@@ -404,7 +404,7 @@ impl Daemon {
         let committed = self.site.commit((self.host_time)());
         let is_waiting = self.site.is_waiting();
         if committed.is_ok() && !is_waiting && self.holds_nothing() {
-            self.pulse.vitals.has_taken();
+            self.reporting.vitals.has_taken();
             self.sources.acknowledge();
         }
         let (counts, queue) = (self.site.counts(), self.sources.batches.len());
@@ -413,7 +413,7 @@ impl Daemon {
         let silences = self.site.mutes((self.host_time)());
         let is_in_place = self.store.is_in_place();
         self.note_state(committed.as_ref().err(), is_waiting, is_in_place);
-        self.pulse.vitals.update(|health| {
+        self.reporting.vitals.update(|health| {
             health.is_store_writable = committed.is_ok() && !is_waiting && is_in_place;
             health.is_clock_wrong = self.site.is_clock_wrong();
             health.held = held;
@@ -435,7 +435,7 @@ impl Daemon {
     /// Deliveries are closed where the hooks are set up: at the start and when a config is taken.
     fn note_closed(&self) -> Result<(), StoreError> {
         let closed = self.store.closed_deliveries()?.len();
-        (self.pulse.vitals).update(|health| health.outbox_closed = closed);
+        (self.reporting.vitals).update(|health| health.outbox_closed = closed);
         Ok(())
     }
 
@@ -460,7 +460,7 @@ impl Daemon {
         // Data time is the clock's only once the past has been read.
         if self.is_caught_up {
             let events = self.site.live(now);
-            self.pulse.vitals.note(&events);
+            self.reporting.vitals.note(&events);
         }
         if self.is_up_to_date {
             self.decide();
@@ -476,7 +476,7 @@ impl Daemon {
         self.note_quarantined()?;
         self.keep_faults();
         let ((outbox, oldest), bytes) = (self.store.outbox()?, self.store.bytes()?);
-        self.pulse.vitals.update(|health| {
+        self.reporting.vitals.update(|health| {
             (health.outbox, health.outbox_oldest) = (outbox, oldest);
             health.database_bytes = Some(bytes);
         });

@@ -6,8 +6,8 @@ use super::daemon::{DRAIN_LIMIT, Daemon, dispatcher};
 use super::hook::Status;
 use super::link;
 use super::progress::Progress;
-use super::pulse::{Reporting, ReportingError};
 use super::record::live::EventWords;
+use super::reporting::{Reporting, ReportingError};
 use super::serve::ServedState;
 use super::shutdown::{self, Shutdown};
 use super::site::{Counts, Sinks, Site};
@@ -75,23 +75,24 @@ pub async fn run(
         archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
         reader: reader(config, &vitals),
     };
-    let mut pulse = Reporting::start(&config.site, vitals, behind).await?;
+    let mut reporting = Reporting::start(&config.site, vitals, behind).await?;
     let sinks = Sinks {
         store: Some(Arc::clone(&store)),
-        alerts: Some(dispatcher(config, &store, pulse.vitals.faults())),
+        alerts: Some(dispatcher(config, &store, reporting.vitals.faults())),
         status: Status::Actual,
     };
     let name = &config.site.name;
-    let resume = || Site::resume(name, config.settings.clone(), sinks, &mut || pulse.turn());
+    let mut turn = || reporting.turn();
+    let resume = || Site::resume(name, config.settings.clone(), sinks, &mut turn);
     let site = tokio::task::block_in_place(resume).map_err(fail)?;
-    site.show(&pulse.vitals);
-    pulse.vitals.retain(|benchmark| site.shows(benchmark));
+    site.show(&reporting.vitals);
+    reporting.vitals.retain(|benchmark| site.shows(benchmark));
     for (source, count) in store.quarantined().map_err(fail)? {
-        pulse.vitals.quarantined(&source, count);
+        reporting.vitals.quarantined(&source, count);
     }
-    let beside = SideTasks::start(config, &store, &pulse.vitals, &shutdown, words);
-    let sources = Sources::start(config, &store, pulse.vitals.faults()).map_err(fail)?;
-    let mut daemon = Daemon::new(config, store, site, sources, pulse, clock::now);
+    let beside = SideTasks::start(config, &store, &reporting.vitals, &shutdown, words);
+    let sources = Sources::start(config, &store, reporting.vitals.faults()).map_err(fail)?;
+    let mut daemon = Daemon::new(config, store, site, sources, reporting, clock::now);
     daemon.beside = Some(beside);
     daemon.note_inherited(config).map_err(fail)?;
     tracing::info!(site = name, state = %config.site.state_dir.display(), "started");
@@ -99,7 +100,7 @@ pub async fn run(
     let Daemon {
         site,
         sources,
-        pulse,
+        reporting,
         beside,
         ..
     } = daemon;
@@ -108,7 +109,7 @@ pub async fn run(
         Some(beside) => beside.stop().await,
         None => None,
     };
-    pulse.stop().await;
+    reporting.stop().await;
     let counts = site.counts();
     let closed = site.close(clock::now(), DRAIN_LIMIT).await;
     if let Some(record) = record {

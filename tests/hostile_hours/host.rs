@@ -14,7 +14,7 @@ use slipwatch::runtime::deliver::{Dispatcher, Retry, Runner};
 use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::Status;
 use slipwatch::runtime::mqtt::ReceivedMessage;
-use slipwatch::runtime::pulse::Reporting;
+use slipwatch::runtime::reporting::Reporting;
 use slipwatch::runtime::serve::ServedState;
 use slipwatch::runtime::shutdown;
 use slipwatch::runtime::site::{Sinks, Site};
@@ -96,7 +96,7 @@ impl<'a> Host<'a> {
         };
         let settings = self.config.settings.clone();
         let site = Site::resume(&self.config.site.name, settings, sinks, &mut || {}).unwrap();
-        let pulse = self
+        let reporting = self
             .runtime
             .block_on(Reporting::start(
                 &self.config.site,
@@ -104,13 +104,20 @@ impl<'a> Host<'a> {
                 ServedState::default(),
             ))
             .unwrap();
-        site.show(&pulse.vitals);
+        site.show(&reporting.vitals);
         let (stop, stopped) = shutdown::pair();
         let (messages, deliveries) = mpsc::channel(CHANNEL);
         let sources = Sources::of(messages.clone(), deliveries, shutdown::pair().0);
         let positions = store.positions().unwrap();
         let follower = Follower::new(&self.config.sources, &self.config.benchmarks, &positions);
-        let daemon = Daemon::new(self.config, Arc::clone(&store), site, sources, pulse, wall);
+        let daemon = Daemon::new(
+            self.config,
+            Arc::clone(&store),
+            site,
+            sources,
+            reporting,
+            wall,
+        );
         Running {
             daemon,
             follower,

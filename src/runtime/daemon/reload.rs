@@ -36,7 +36,7 @@ impl Daemon {
             tokio::select! {
                 _ = &mut closing => return,
                 // Bounded, so it is no way of keeping a daemon that stands still alive.
-                () = tokio::time::sleep(TICK) => self.pulse.turn(),
+                () = tokio::time::sleep(TICK) => self.reporting.turn(),
             }
         }
     }
@@ -84,7 +84,7 @@ impl Daemon {
             tracing::warn!(%error, "that cannot be kept for slipwatch status");
         }
         // Last, so that whoever sees it here finds it in the status too.
-        (self.pulse.vitals).update(|health| health.config_refused.clone_from(&refusal.refused));
+        (self.reporting.vitals).update(|health| health.config_refused.clone_from(&refusal.refused));
     }
 
     /// What is in force now is the config file as it is.
@@ -99,7 +99,7 @@ impl Daemon {
         let (time, kind) = ((self.host_time)(), kind.to_owned());
         let input = Input::Trouble { kind, text };
         let events = self.site.take(&Arrival { time, input }, time)?;
-        self.pulse.vitals.note(&events);
+        self.reporting.vitals.note(&events);
         self.commit()
     }
 
@@ -128,7 +128,7 @@ impl Daemon {
             Ok(fresh) => fresh,
             Err(why) => return self.refuse_config(why),
         };
-        self.pulse.service.reloading();
+        self.reporting.service.reloading();
         // What has been read already is taken under the old config.
         self.sources.stop();
         while let Some(batch) = self.sources.batches.recv().await {
@@ -140,22 +140,25 @@ impl Daemon {
         }
         // The page takes what the messages hold from here on.
         link::make_secret_of(&fresh);
-        self.pulse.follow(token, Facts::of(&fresh));
+        self.reporting.follow(token, Facts::of(&fresh));
         let events = self.site.change_settings(fresh.settings.clone());
-        self.pulse.vitals.note(&events);
-        self.site.show(&self.pulse.vitals);
-        (self.pulse.vitals).retain(|benchmark| self.site.shows(benchmark));
+        self.reporting.vitals.note(&events);
+        self.site.show(&self.reporting.vitals);
+        (self.reporting.vitals).retain(|benchmark| self.site.shows(benchmark));
         self.commit()?;
         // Before they are set up: what changes meanwhile is seen at the next reload.
         let read = read_by_hooks(&fresh);
         if !self.keeps_hooks(&fresh, read) {
             self.close_hooks().await;
-            self.site
-                .rehook(dispatcher(&fresh, &self.store, self.pulse.vitals.faults()))?;
+            self.site.rehook(dispatcher(
+                &fresh,
+                &self.store,
+                self.reporting.vitals.faults(),
+            ))?;
         }
         self.note_closed()?;
         self.note_inherited(&fresh)?;
-        self.sources = Sources::start(&fresh, &self.store, self.pulse.vitals.faults())?;
+        self.sources = Sources::start(&fresh, &self.store, self.reporting.vitals.faults())?;
         if let Some(beside) = &mut self.beside {
             beside.follow(&fresh).await;
         }
@@ -167,7 +170,7 @@ impl Daemon {
         (self.files_are_read, self.is_up_to_date) = (false, false);
         self.read_by_hooks = read;
         self.config = fresh;
-        self.pulse.service.ready("watching");
+        self.reporting.service.ready("watching");
         tracing::info!(file = %self.config.file.display(), "the config is taken");
         self.config_is_taken();
         self.report_inherited()?;

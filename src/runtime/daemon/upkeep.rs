@@ -19,7 +19,7 @@ impl Daemon {
 
     /// Keeps how much could not be used, for those who ask the state; on a full disk the next time does.
     pub(super) fn note_quarantined(&mut self) -> Result<(), StoreError> {
-        let counts = self.pulse.vitals.health().quarantined;
+        let counts = self.reporting.vitals.health().quarantined;
         if counts == self.quarantined {
             return Ok(());
         }
@@ -35,7 +35,7 @@ impl Daemon {
 
     /// Keeps what lasts and keeps it from its work, for those who ask the state.
     pub(super) fn keep_faults(&mut self) {
-        let faults = self.pulse.vitals.faults().shown();
+        let faults = self.reporting.vitals.faults().shown();
         if self.faults.as_ref() == Some(&faults) {
             return;
         }
@@ -54,7 +54,7 @@ impl Daemon {
         is_waiting: bool,
         is_in_place: bool,
     ) {
-        let faults = self.pulse.vitals.faults();
+        let faults = self.reporting.vitals.faults();
         let why = match error {
             Some(error) => error.to_string(),
             None if is_waiting => "there is no room on the disk".to_owned(),
@@ -70,7 +70,7 @@ impl Daemon {
 
     /// Where orange or red is in force.
     fn levels_in_memory(&self) -> String {
-        let points = self.pulse.vitals.points();
+        let points = self.reporting.vitals.points();
         let grave = points.iter().filter(|(_, one)| one.level >= Level::Orange);
         let named: Vec<String> = (grave.take(MOST_NAMED))
             .map(|(id, one)| format!("{id} {}", one.level.name()))
@@ -84,12 +84,12 @@ impl Daemon {
 
     /// Looks at a few more rows of the state. Where one is damaged the work goes on, and people are to see to it.
     pub(super) fn verify(&mut self) {
-        let is_damaged = self.pulse.vitals.health().is_store_damaged;
+        let is_damaged = self.reporting.vitals.health().is_store_damaged;
         if let Err(error) = self.store.verify(&mut self.verified)
             && !is_damaged
         {
             tracing::error!(%error, "the state on the disk is damaged");
-            self.pulse
+            self.reporting
                 .vitals
                 .update(|health| health.is_store_damaged = true);
         }

@@ -12,7 +12,7 @@ use crate::runtime::deliver::{Dispatcher, Retry, Runner};
 use crate::runtime::delivered::Delivered;
 use crate::runtime::drilled::{PassedDrill, folder};
 use crate::runtime::hook::{HookOutcome, Status};
-use crate::runtime::pulse::Reporting;
+use crate::runtime::reporting::Reporting;
 use crate::runtime::shutdown::Shutdown;
 use crate::runtime::site::{Sinks, Site};
 use crate::runtime::sources::Sources;
@@ -152,9 +152,9 @@ impl Exercise {
         };
         let name = &context.config.site.name;
         let site = Site::resume(name, config.settings.clone(), sinks, &mut || {})?;
-        let pulse = Reporting::inward();
-        let sources = Sources::start(&config, &store, pulse.vitals.faults())?;
-        let daemon = Daemon::new(&config, store, site, sources, pulse, clock::now);
+        let reporting = Reporting::inward();
+        let sources = Sources::start(&config, &store, reporting.vitals.faults())?;
+        let daemon = Daemon::new(&config, store, site, sources, reporting, clock::now);
         Ok(Self {
             daemon,
             watched,
@@ -172,7 +172,7 @@ impl Exercise {
         drill: &Drill,
     ) -> Result<PassedDrill, String> {
         self.until(LIMIT, "its past was not read", |daemon, _| {
-            daemon.pulse.vitals.health().is_caught_up
+            daemon.reporting.vitals.health().is_caught_up
         })
         .await?;
         if self.watched.seen().begun.is_some() {
