@@ -16,7 +16,7 @@ pub use runner::{Processes, Runner, Senders, run};
 
 use super::delivered::Delivered;
 use super::hook::{Alert, MessageState};
-use super::in_hand::InHand;
+use super::queued_alerts::QueuedAlerts;
 use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::monitor::EventKind;
@@ -76,13 +76,13 @@ impl Retry {
 struct HookQueue {
     hook: HookConfig,
     queue: mpsc::Sender<Alert>,
-    in_hand: Arc<Mutex<InHand>>,
+    queued: Arc<Mutex<QueuedAlerts>>,
 }
 
 impl HookQueue {
     fn supersede(&self, alert: &Alert) {
         let keeps_ends = (self.hook.to.as_ref()).is_some_and(|to| to.goes_by_keys());
-        locked(&self.in_hand).supersede(alert, keeps_ends);
+        locked(&self.queued).supersede(alert, keeps_ends);
     }
 }
 
@@ -142,15 +142,15 @@ impl Dispatcher {
         let mut queues = Vec::new();
         for hook in hooks {
             let (queue, receiver) = mpsc::channel(QUEUE);
-            let in_hand = Arc::new(Mutex::new(InHand::default()));
-            let (delivered, shared) = (Arc::clone(&delivered), Arc::clone(&in_hand));
+            let queued = Arc::new(Mutex::new(QueuedAlerts::default()));
+            let (delivered, shared) = (Arc::clone(&delivered), Arc::clone(&queued));
             let worker = Worker::new(hook, Arc::clone(runner), retry, delivered, shared);
             workers.spawn(worker.run(receiver));
             let hook = hook.clone();
             queues.push(HookQueue {
                 hook,
                 queue,
-                in_hand,
+                queued,
             });
         }
         Self {
@@ -161,8 +161,7 @@ impl Dispatcher {
     }
 
     /// Hands `alert` to every hook that asks for it, has not taken it before and does not
-    /// have it in hand. Never waits: what finds a queue full is not taken in hand, and said to be;
-    /// `false` then.
+    /// have it queued. Never waits: what finds a queue full is logged and not queued; `false` then.
     pub fn offer(&self, alert: &Alert) -> bool {
         self.offer_where(alert, false, &|_| true)
     }
@@ -222,7 +221,7 @@ impl Dispatcher {
     /// also after a restart.
     pub fn end(&self, alert: &Alert) {
         for way in &self.hooks {
-            locked(&way.in_hand).end(alert);
+            locked(&way.queued).end(alert);
             if way.hook.asks_for(alert) {
                 self.call_off(way, alert, DeliveryOutcome::Acknowledged);
             }
@@ -242,10 +241,10 @@ impl Dispatcher {
     /// Somebody has seen everything: what reports many benchmarks at once too, where it `is_seen`.
     pub fn end_those_of_many(&self, is_seen: &dyn Fn(&Alert) -> bool) {
         for way in &self.hooks {
-            let of_many = locked(&way.in_hand).of_many();
+            let of_many = locked(&way.queued).of_many();
             let is_meant = |one: &&Alert| one.state != MessageState::Resolved && is_seen(one);
             for alert in of_many.iter().filter(is_meant) {
-                locked(&way.in_hand).end(alert);
+                locked(&way.queued).end(alert);
                 self.call_off(way, alert, DeliveryOutcome::Acknowledged);
             }
         }
@@ -254,14 +253,14 @@ impl Dispatcher {
     /// Nobody is notified, for now, of what is muted by its place and level; of everything else they are.
     pub(super) fn mute(&self, is_muted: &dyn Fn(Option<&BenchmarkId>, Level) -> bool) {
         for way in &self.hooks {
-            locked(&way.in_hand).mute(is_muted);
+            locked(&way.queued).mute(is_muted);
         }
     }
 
     /// What `alert` reports is over: it is not tried any more.
     pub(super) fn is_over(&self, alert: &Alert) {
         for way in &self.hooks {
-            locked(&way.in_hand).end(alert);
+            locked(&way.queued).end(alert);
         }
     }
 
@@ -280,12 +279,12 @@ impl Dispatcher {
     /// [`Dispatcher::commit`] on.
     fn call_off(&self, way: &HookQueue, alert: &Alert, fate: DeliveryOutcome) {
         let name = way.hook.name();
-        let mut in_hand = locked(&way.in_hand);
+        let mut queued = locked(&way.queued);
         let mut delivered = locked(&self.delivered);
         if delivered.has(alert, &name) {
             return;
         }
-        in_hand.end(alert);
+        queued.end(alert);
         let key = &alert.key;
         tracing::info!(hook = name, key, ?fate, "not sent, or not tried again");
         if let Err(error) = delivered.record_outcome(alert, &name, fate) {
@@ -294,7 +293,7 @@ impl Dispatcher {
     }
 
     /// Whether this is the end of what was called off, or waited, and was never reported: neither of them is then.
-    fn ends_unreported(&self, way: &HookQueue, in_hand: &mut InHand, alert: &Alert) -> bool {
+    fn ends_unreported(&self, way: &HookQueue, queued: &mut QueuedAlerts, alert: &Alert) -> bool {
         // Of what ends together only what was reported is named.
         if alert.state != MessageState::Resolved || alert.is_flood() {
             return false;
@@ -305,12 +304,12 @@ impl Dispatcher {
             return false;
         }
         if delivered.was_notified(&firing, &name)
-            || in_hand.was_tried(&firing)
+            || queued.was_tried(&firing)
             || delivered.attempts(&firing, &name) > 0
         {
             return false;
         }
-        in_hand.end(&firing);
+        queued.end(&firing);
         for one in [&firing, alert] {
             if let Err(error) = delivered.note(one, &name, DeliveryOutcome::Over) {
                 let key = &alert.key;
@@ -322,26 +321,26 @@ impl Dispatcher {
 
     fn offer_to(&self, way: &HookQueue, alert: &Alert, is_muted: bool) -> bool {
         let (name, key) = (way.hook.name(), &alert.key);
-        // In hand first: a worker notes the receipt before it lets go.
-        let mut in_hand = locked(&way.in_hand);
-        if self.ends_unreported(way, &mut in_hand, alert) {
+        // Queued first: a worker notes the receipt before it lets go.
+        let mut queued = locked(&way.queued);
+        if self.ends_unreported(way, &mut queued, alert) {
             return true;
         }
-        if in_hand.cancels(alert) {
+        if queued.cancels(alert) {
             tracing::debug!(hook = name, key, "over before it was reported");
             if let Err(error) = locked(&self.delivered).note(alert, &name, DeliveryOutcome::Over) {
                 tracing::warn!(hook = name, key, %error, "no receipt: a restart may send it");
             }
             return true;
         }
-        if !in_hand.take(alert, is_muted) {
+        if !queued.take(alert, is_muted) {
             return true;
         }
         if locked(&self.delivered).has(alert, &name) {
-            in_hand.release(alert);
+            queued.release(alert);
             tracing::debug!(hook = name, key, "delivered before");
         } else if let Err(error) = way.queue.try_send(alert.clone()) {
-            in_hand.release(alert);
+            queued.release(alert);
             tracing::error!(hook = name, key, %error, "no room for an alert");
             return false;
         }

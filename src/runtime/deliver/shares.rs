@@ -85,7 +85,7 @@ impl Dispatcher {
     /// Whether a hook has been run for this alert, whatever came of it.
     pub(super) fn has_received(&self, way: &HookQueue, alert: &Alert) -> bool {
         let name = way.hook.name();
-        let was_tried = locked(&way.in_hand).was_tried(alert);
+        let was_tried = locked(&way.queued).was_tried(alert);
         let delivered = locked(&self.delivered);
         was_tried || delivered.was_notified(alert, &name) || delivered.attempts(alert, &name) > 0
     }

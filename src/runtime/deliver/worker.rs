@@ -7,7 +7,7 @@ use crate::reading::{BenchmarkId, Timestamp, counted};
 use crate::runtime::clock;
 use crate::runtime::delivered::Delivered;
 use crate::runtime::hook::{Alert, HookOutcome, MessageState};
-use crate::runtime::in_hand::InHand;
+use crate::runtime::queued_alerts::QueuedAlerts;
 use crate::store::DeliveryOutcome;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -105,7 +105,7 @@ pub(super) struct Worker {
     runner: Arc<dyn Runner>,
     retry: Retry,
     delivered: Arc<Mutex<Delivered>>,
-    in_hand: Arc<Mutex<InHand>>,
+    queued: Arc<Mutex<QueuedAlerts>>,
     /// A retry never holds up a new alert.
     waiting: BTreeMap<Turn, Waiting>,
     running: Vec<Running>,
@@ -122,14 +122,14 @@ impl Worker {
         runner: Arc<dyn Runner>,
         retry: &Retry,
         delivered: Arc<Mutex<Delivered>>,
-        in_hand: Arc<Mutex<InHand>>,
+        queued: Arc<Mutex<QueuedAlerts>>,
     ) -> Self {
         Self {
             hook: Arc::new(hook.clone()),
             runner,
             retry: retry.clone(),
             delivered,
-            in_hand,
+            queued,
             waiting: BTreeMap::new(),
             running: Vec::new(),
             untried: 0,
@@ -219,7 +219,7 @@ impl Worker {
         };
         self.untried -= usize::from(waiting.is_new);
         self.break_off(&waiting.alert);
-        locked(&self.in_hand).is_tried(&waiting.alert);
+        locked(&self.queued).is_tried(&waiting.alert);
         let (hook, alert) = (Arc::clone(&self.hook), waiting.alert.clone());
         let task = tokio::spawn(self.runner.run(hook, alert, waiting.attempt));
         self.running.push(Running {
@@ -243,7 +243,7 @@ impl Worker {
     fn hold_back(&mut self, open: bool) {
         let now = clock::later(Duration::ZERO);
         let off_duty = self.duty_wait();
-        let in_hand = locked(&self.in_hand);
+        let queued = locked(&self.queued);
         let due = (self.waiting.iter_mut()).take_while(|((due, _), _)| !open || *due <= now);
         let mut later = Vec::new();
         for (turn, waiting) in due {
@@ -251,7 +251,7 @@ impl Worker {
                 .hook
                 .unacknowledged_wait(waiting.escalation, now)
                 .max(off_duty);
-            let wait = if in_hand.is_muted(&waiting.alert) {
+            let wait = if queued.is_muted(&waiting.alert) {
                 LOOK_AGAIN_MUTED
             } else {
                 wait.min(LOOK_AGAIN)
@@ -261,7 +261,7 @@ impl Worker {
                 later.push((*turn, now + wait));
             }
         }
-        drop(in_hand);
+        drop(queued);
         for (turn, due) in later {
             if let Some(waiting) = self.waiting.remove(&turn) {
                 self.waiting.insert((due, turn.1), waiting);
@@ -357,7 +357,7 @@ impl Worker {
     /// Notes what became of an alert, then lets go of it.
     fn finish(&self, alert: &Alert, fate: DeliveryOutcome) {
         self.note(alert, fate);
-        locked(&self.in_hand).release(alert);
+        locked(&self.queued).release(alert);
     }
 
     fn note(&self, alert: &Alert, fate: DeliveryOutcome) {
@@ -369,7 +369,7 @@ impl Worker {
     }
 
     fn is_over(&self, alert: &Alert) -> bool {
-        locked(&self.in_hand).is_over(alert)
+        locked(&self.queued).is_over(alert)
     }
 
     fn drop_over(&mut self, alert: &Alert) {

@@ -1,4 +1,4 @@
-//! What a hook's worker has in hand: neither taken by the hook nor given up.
+//! The alerts that a hook's worker has: neither taken by the hook nor given up.
 
 use super::hook::{Alert, MessageState, state_name};
 use crate::alert::Level;
@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// What distinguishes an alert from every other.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct InHandKey {
+struct QueuedKey {
     key: String,
     level: Level,
     state: &'static str,
@@ -27,12 +27,12 @@ struct Entry {
     is_muted: bool,
 }
 
-/// The alerts in one worker's hand, its queue included.
+/// The alerts of one worker, the one that it tries included.
 #[derive(Debug, Default)]
-pub(super) struct InHand(BTreeMap<InHandKey, Entry>);
+pub(super) struct QueuedAlerts(BTreeMap<QueuedKey, Entry>);
 
-impl InHand {
-    /// Takes `alert` in hand, for no attempt while `is_muted`; `false` when it is there already.
+impl QueuedAlerts {
+    /// Queues `alert`, for no attempt while `is_muted`; `false` when it is there already.
     pub(super) fn take(&mut self, alert: &Alert, is_muted: bool) -> bool {
         let token = token(alert);
         if self.0.contains_key(&token) {
@@ -59,7 +59,7 @@ impl InHand {
 
     /// Notes of each alert whether it is silenced or shelved, by its place and level.
     pub(super) fn mute(&mut self, is_muted: &dyn Fn(Option<&BenchmarkId>, Level) -> bool) {
-        for (InHandKey { level, .. }, entry) in &mut self.0 {
+        for (QueuedKey { level, .. }, entry) in &mut self.0 {
             entry.is_muted = is_muted(entry.benchmark.as_ref(), *level);
         }
     }
@@ -91,7 +91,7 @@ impl InHand {
         {
             return false;
         }
-        let firing = InHandKey {
+        let firing = QueuedKey {
             state: state_name(MessageState::Firing),
             ..token(alert)
         };
@@ -144,8 +144,8 @@ impl InHand {
     }
 }
 
-fn token(alert: &Alert) -> InHandKey {
-    InHandKey {
+fn token(alert: &Alert) -> QueuedKey {
+    QueuedKey {
         key: alert.key.clone(),
         level: alert.level,
         state: state_name(alert.state),
