@@ -4,6 +4,7 @@
 mod folders;
 mod healing;
 mod life;
+pub mod random;
 mod world;
 
 pub use folders::{measured, project};

@@ -1,6 +1,7 @@
 //! The instrument that reads a simulated slope: its noise, gaps, resets and bumps.
 
-use super::{Fate, log_uniform, normal, sign};
+use super::{Fate, sign};
+use crate::random::{log_uniform, normal};
 use rand::{Rng, RngExt};
 
 /// Days between readings, and all that stands between the motion and what is read of it.

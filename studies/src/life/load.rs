@@ -1,6 +1,7 @@
 //! The loads that act on simulated slopes, which nobody declares.
 
-use super::{Fate, log_uniform, normal};
+use super::Fate;
+use crate::random::{log_uniform, normal};
 use rand::{Rng, RngExt};
 
 /// Step of the load, days.

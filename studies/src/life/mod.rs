@@ -12,9 +12,9 @@ mod slope;
 
 pub use corpus::Corpus;
 
+use crate::random::log_uniform;
 use instrument::Instrument;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use slipwatch::fit::Observations;
 use slipwatch::model::Law;
@@ -149,14 +149,6 @@ impl Life {
             (life, path)
         })
     }
-}
-
-fn normal(generator: &mut impl Rng) -> f64 {
-    generator.sample(StandardNormal)
-}
-
-fn log_uniform(generator: &mut impl Rng, low: f64, high: f64) -> f64 {
-    low * (high / low).powf(generator.random::<f64>())
 }
 
 fn sign(generator: &mut impl Rng) -> f64 {

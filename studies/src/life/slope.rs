@@ -1,8 +1,9 @@
 //! The law of a simulated slope and the path that it takes under its load.
 
 use super::load::STEP_DAYS;
-use super::{Fate, Life, log_uniform};
+use super::{Fate, Life};
 use crate::healing::law_from_healing;
+use crate::random::log_uniform;
 use rand::{Rng, RngExt};
 use slipwatch::model::{Accuracy, Law, Load, LoadedLaw};
 

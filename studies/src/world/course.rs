@@ -1,7 +1,8 @@
 //! The course of a slope's velocity before weather and roughness: stretches of creep, acceleration and relaxation.
 
+use super::Family;
 use super::gauge::Gauge;
-use super::{Family, between, happens, log_uniform, normal};
+use crate::random::{happens, log_uniform, normal, uniform};
 use rand::{Rng, RngExt};
 
 /// Velocity last read before a collapse: median, mm/day, and decades; and its bounds. The published ones are mostly of
@@ -214,7 +215,7 @@ impl Acceleration {
         let alpha = if happens(generator, 0.6) {
             (2.0 + 0.25 * normal(generator)).clamp(1.3, 3.0)
         } else {
-            between(generator, 1.3, 3.0)
+            uniform(generator, 1.3, 3.0)
         };
         Self {
             from,
@@ -234,9 +235,9 @@ impl Acceleration {
         match family {
             Family::Exponential => whole(1.0, SMOOTH),
             Family::LogPeriodic => {
-                let amplitude = between(generator, 0.2, 0.9);
-                let frequency = between(generator, 4.0, 9.0);
-                let phase = between(generator, 0.0, std::f64::consts::TAU);
+                let amplitude = uniform(generator, 0.2, 0.9);
+                let frequency = uniform(generator, 4.0, 9.0);
+                let phase = uniform(generator, 0.0, std::f64::consts::TAU);
                 whole(self.alpha, (amplitude, frequency, phase));
             }
             Family::Handover => self.handed_over(stretches, generator),
@@ -247,7 +248,7 @@ impl Acceleration {
                 let alpha = if half {
                     1.0
                 } else {
-                    between(generator, 1.2, 2.0)
+                    uniform(generator, 1.2, 2.0)
                 };
                 whole(alpha, SMOOTH);
                 let rest = self.duration * log_uniform(generator, 0.2, 3.0);
@@ -272,19 +273,19 @@ impl Acceleration {
     }
 
     fn handed_over(&self, stretches: &mut Vec<Stretch>, generator: &mut impl Rng) {
-        let first = self.duration * between(generator, 0.2, 0.6);
-        let top = self.first * (self.last / self.first).powf(between(generator, 0.3, 0.8));
-        let low = top * between(generator, 0.15, 0.6);
-        let rest = self.duration * between(generator, 0.1, 0.3);
+        let first = self.duration * uniform(generator, 0.2, 0.6);
+        let top = self.first * (self.last / self.first).powf(uniform(generator, 0.3, 0.8));
+        let low = top * uniform(generator, 0.15, 0.6);
+        let rest = self.duration * uniform(generator, 0.1, 0.3);
         let begins = self.from + first;
-        let alpha = between(generator, 1.3, 2.2);
+        let alpha = uniform(generator, 1.3, 2.2);
         stretches.push(voight(
             (self.from, begins),
             (self.first, top),
             alpha,
             SMOOTH,
         ));
-        let memory = rest / between(generator, 1.5, 6.0);
+        let memory = rest / uniform(generator, 1.5, 6.0);
         stretches.push(relaxing((begins, begins + rest), (top, low), memory));
         let to = (self.from + self.duration).max(begins + 2.0 * rest);
         stretches.push(voight(
@@ -321,8 +322,8 @@ impl Acceleration {
             ));
             at += cut - done;
             let pause = (self.duration - cut) * log_uniform(generator, 0.3, 3.0);
-            let kept = high * between(generator, 0.03, 0.5);
-            let memory = pause * between(generator, 0.03, 0.4);
+            let kept = high * uniform(generator, 0.03, 0.5);
+            let memory = pause * uniform(generator, 0.03, 0.4);
             stretches.push(relaxing((at, at + pause), (high, kept), memory));
             at += pause;
             done = cut;
@@ -335,14 +336,14 @@ impl Acceleration {
     fn in_pieces(&self, stretches: &mut Vec<Stretch>, generator: &mut impl Rng) {
         let count = if happens(generator, 0.7) { 1 } else { 2 };
         let (mut at, mut first) = (self.from, self.first);
-        let mut span = self.duration * between(generator, 0.3, 0.8);
+        let mut span = self.duration * uniform(generator, 0.3, 0.8);
         for _ in 0..count {
-            let top = self.last * between(generator, 0.3, 1.5);
+            let top = self.last * uniform(generator, 0.3, 1.5);
             stretches.push(voight((at, at + span), (first, top), self.alpha, SMOOTH));
             at += span;
             let rest = span * log_uniform(generator, 0.05, 0.6);
             first = top * log_uniform(generator, 0.05, 0.6);
-            let memory = rest * between(generator, 0.05, 0.4);
+            let memory = rest * uniform(generator, 0.05, 0.4);
             stretches.push(relaxing((at, at + rest), (top, first), memory));
             at += rest;
             span = self.duration * log_uniform(generator, 0.05, 0.4);
@@ -360,10 +361,10 @@ impl Acceleration {
     fn levelled(&self, stretches: &mut Vec<Stretch>, generator: &mut impl Rng) {
         let rest = self.duration * log_uniform(generator, 0.03, 0.5);
         let to = self.from + self.duration - rest;
-        let top = self.last * between(generator, 0.7, 1.1);
+        let top = self.last * uniform(generator, 0.7, 1.1);
         let velocities = (self.first, top);
         stretches.push(voight((self.from, to), velocities, self.alpha, SMOOTH));
-        let memory = rest * between(generator, 0.1, 1.0);
+        let memory = rest * uniform(generator, 0.1, 1.0);
         let kept = (top, self.last);
         stretches.push(relaxing((to, to + rest), kept, memory));
     }
@@ -375,7 +376,7 @@ impl Acceleration {
         let velocities = (self.first.min(0.5 * top), top);
         stretches.push(voight((self.from, to), velocities, 1.0, SMOOTH));
         let rest = self.duration * log_uniform(generator, 0.3, 3.0);
-        let kept = top * between(generator, 0.8, 1.5);
+        let kept = top * uniform(generator, 0.8, 1.5);
         stretches.push(relaxing((to, to + rest), (top, kept), 0.3 * rest));
     }
 }
@@ -413,7 +414,7 @@ fn straight((from, to): (f64, f64), velocities: (f64, f64)) -> Stretch {
 }
 
 fn two_rates(end: f64, creep: f64, generator: &mut impl Rng) -> Vec<Stretch> {
-    let change = end * between(generator, 0.2, 0.8);
+    let change = end * uniform(generator, 0.2, 0.8);
     let ramp = end * log_uniform(generator, 0.001, 0.1);
     let faster = creep.max(0.1) * log_uniform(generator, 1.3, 6.0);
     vec![
@@ -427,7 +428,7 @@ fn two_rates(end: f64, creep: f64, generator: &mut impl Rng) -> Vec<Stretch> {
 fn draw_downs(end: f64, creep: f64, generator: &mut impl Rng) -> Vec<Stretch> {
     const FASTEST: f64 = 400.0;
     let (mut stretches, mut at) = (Vec::new(), 0.0);
-    let mut rest = between(generator, 0.1, 0.9) * end.min(365.0);
+    let mut rest = uniform(generator, 0.1, 0.9) * end.min(365.0);
     while at < end {
         stretches.push(straight((at, at + rest), (creep, creep)));
         at += rest;
@@ -436,10 +437,10 @@ fn draw_downs(end: f64, creep: f64, generator: &mut impl Rng) -> Vec<Stretch> {
         stretches.push(straight((at, at + rise), (creep, top)));
         at += rise;
         let fall = log_uniform(generator, 5.0, 40.0);
-        let memory = fall * between(generator, 0.1, 0.4);
+        let memory = fall * uniform(generator, 0.1, 0.4);
         stretches.push(relaxing((at, at + fall), (top, creep), memory));
         at += fall;
-        rest = 365.0 * between(generator, 0.5, 1.1);
+        rest = 365.0 * uniform(generator, 0.5, 1.1);
     }
     stretches
 }
@@ -452,7 +453,7 @@ fn fits(end: f64, creep: f64, generator: &mut impl Rng) -> Vec<Stretch> {
     let every = end / log_uniform(generator, 5.0, 60.0);
     let (mut stretches, mut at) = (Vec::new(), 0.0);
     while at < end {
-        let hold = every * between(generator, 0.4, 1.6);
+        let hold = every * uniform(generator, 0.4, 1.6);
         stretches.push(straight((at, at + hold), (0.3 * creep, 0.3 * creep)));
         at += hold;
         let slip = every * log_uniform(generator, 0.01, 0.2);

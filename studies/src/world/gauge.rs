@@ -1,7 +1,8 @@
 //! The instruments that read simulated slopes: sampling, noise, waves, resolution, gaps, resets and loss.
 
+use super::Family;
 use super::onward::Path;
-use super::{Family, between, happens, log_uniform, normal};
+use crate::random::{happens, log_uniform, normal, uniform};
 use rand::{Rng, RngExt};
 use std::f64::consts::TAU;
 
@@ -232,7 +233,7 @@ impl Gauge {
             let windows = if happens(generator, 0.5) {
                 1.0
             } else {
-                between(generator, 1.0, 6.0)
+                uniform(generator, 1.0, 6.0)
             };
             self.averaging = self.interval * windows;
             if happens(generator, 0.3) {
@@ -266,7 +267,7 @@ impl Gauge {
         let mut at = start;
         while at < end {
             let irregular = if self.kind == GaugeKind::Survey {
-                between(generator, -0.2, 0.2) * self.interval
+                uniform(generator, -0.2, 0.2) * self.interval
             } else {
                 0.0
             };
@@ -299,7 +300,7 @@ impl Gauge {
     fn record(&self, end: f64, generator: &mut impl Rng) -> Record {
         let mut gaps = Vec::new();
         while happens(generator, self.gaps) {
-            let from = between(generator, 0.0, end);
+            let from = uniform(generator, 0.0, end);
             gaps.push((
                 from,
                 from + self.interval * log_uniform(generator, 3.0, 40.0),
@@ -307,7 +308,7 @@ impl Gauge {
         }
         let mut resets = Vec::new();
         while resets.len() < 8 && happens(generator, self.resets) {
-            let at = between(generator, 0.0, end);
+            let at = uniform(generator, 0.0, end);
             let size = log_uniform(generator, 5.0, 1000.0) * self.white.max(0.05);
             let sign = if happens(generator, 0.5) { 1.0 } else { -1.0 };
             resets.push((at, sign * size));
@@ -315,9 +316,9 @@ impl Gauge {
         Record {
             gaps,
             resets,
-            phase: between(generator, 0.0, TAU),
-            yearly_phase: between(generator, 0.0, TAU),
-            second_wave: between(generator, 0.0, 0.5),
+            phase: uniform(generator, 0.0, TAU),
+            yearly_phase: uniform(generator, 0.0, TAU),
+            second_wave: uniform(generator, 0.0, 0.5),
         }
     }
 

@@ -14,10 +14,10 @@ mod weather;
 pub use gauge::GaugeKind;
 
 use crate::life::{Fate, Life};
+use crate::random::{happens, uniform};
 use course::Course;
 use gauge::Gauge;
-use rand::{Rng, RngExt, SeedableRng};
-use rand_distr::StandardNormal;
+use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use slipwatch::fit::{Observation, Observations};
 use slipwatch::reading::Quantity;
@@ -207,7 +207,7 @@ impl Simulated {
         let readings = gauge.read(&path, family, generator);
         // Many a record begins when somebody has seen the slope move.
         let begins = if happens(generator, BEGUN.0) {
-            course.onset + between(generator, 0.0, BEGUN.1) * (course.end - course.onset)
+            course.onset + uniform(generator, 0.0, BEGUN.1) * (course.end - course.onset)
         } else {
             0.0
         };
@@ -251,22 +251,6 @@ impl Simulated {
             end_days: course.end,
         }
     }
-}
-
-fn normal(generator: &mut impl Rng) -> f64 {
-    generator.sample(StandardNormal)
-}
-
-fn log_uniform(generator: &mut impl Rng, low: f64, high: f64) -> f64 {
-    low * (high / low).powf(generator.random::<f64>())
-}
-
-fn between(generator: &mut impl Rng, low: f64, high: f64) -> f64 {
-    low + (high - low) * generator.random::<f64>()
-}
-
-fn happens(generator: &mut impl Rng, chance: f64) -> bool {
-    generator.random::<f64>() < chance
 }
 
 #[cfg(test)]

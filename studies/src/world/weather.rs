@@ -1,6 +1,7 @@
 //! What weather adds to a slope: pulses of velocity, a season, and roughness.
 
-use super::{Family, between, happens, log_uniform, normal};
+use super::Family;
+use crate::random::{happens, log_uniform, normal, uniform};
 use rand::{Rng, RngExt};
 use std::f64::consts::TAU;
 
@@ -102,8 +103,8 @@ impl Weather {
             },
             roughness: (rough, memory),
             rough: 0.0,
-            season: (season, between(generator, 0.0, TAU)),
-            swing: (swing, between(generator, 0.0, TAU)),
+            season: (season, uniform(generator, 0.0, TAU)),
+            swing: (swing, uniform(generator, 0.0, TAU)),
         }
     }
 
@@ -131,7 +132,7 @@ impl Weather {
 fn pulses(family: Family, end: f64, generator: &mut impl Rng) -> Vec<Pulse> {
     let kind = if family == Family::Rain {
         let storms = log_uniform(generator, 5.0, 40.0);
-        let least = 3.0 * 365.25 / end * between(generator, 0.3, 1.5);
+        let least = 3.0 * 365.25 / end * uniform(generator, 0.3, 1.5);
         Kind {
             often: storms.max(least),
             size: RAIN,

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, Exp, Gamma, StandardNormal};
+use rand_distr::{Distribution, Exp, Gamma};
 use rand_pcg::Pcg64;
 use slipwatch::model::{Accuracy, Law, Load, LoadedLaw};
 use slipwatch::reading::{
@@ -10,6 +10,7 @@ use slipwatch::reading::{
     after_days,
 };
 use studies::law_from_healing;
+use studies::random::{normal, uniform};
 
 /// Days between two values of the load.
 const TICK: f64 = 0.1;
@@ -236,12 +237,4 @@ fn days_in(span: f64) -> usize {
 )]
 fn whole(value: f64) -> usize {
     value.round() as usize
-}
-
-fn uniform(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
-    low + (high - low) * rng.random::<f64>()
-}
-
-fn normal(rng: &mut Pcg64) -> f64 {
-    StandardNormal.sample(rng)
 }

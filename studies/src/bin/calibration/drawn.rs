@@ -5,11 +5,12 @@
 //! before a late start the velocity is that of the start, or walks away from it.
 
 use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, StandardNormal, StudentT};
+use rand_distr::{Distribution, StudentT};
 use rand_pcg::Pcg64;
 use slipwatch::fit::{Observation, Observations};
 use slipwatch::model::{Accuracy, Law, Trajectory};
 use slipwatch::reading::Quantity;
+use studies::random::{log_uniform_by_exp, normal, uniform};
 
 /// Whether the law holds from the first reading on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,25 +71,13 @@ pub(crate) fn drawn(index: u64, starts: Starts) -> Drawn {
     }
 }
 
-fn uniform(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
-    low + (high - low) * rng.random::<f64>()
-}
-
-fn log_uniform(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
-    uniform(rng, low.ln(), high.ln()).exp()
-}
-
-fn normal(rng: &mut Pcg64) -> f64 {
-    StandardNormal.sample(rng)
-}
-
 /// Reading times, evenly or at random, from 0 on.
 fn times(rng: &mut Pcg64) -> Vec<f64> {
-    let wanted = log_uniform(rng, 15.0, 500.0).round();
+    let wanted = log_uniform_by_exp(rng, 15.0, 500.0).round();
     let count = (15..500)
         .find(|count| f64::from(*count) >= wanted)
         .unwrap_or(500);
-    let length = log_uniform(rng, 20.0, 1000.0);
+    let length = log_uniform_by_exp(rng, 20.0, 1000.0);
     let mut times: Vec<f64> = if rng.random::<bool>() {
         (0..count)
             .map(|i| length * f64::from(i) / f64::from(count - 1))
@@ -105,7 +94,7 @@ fn times(rng: &mut Pcg64) -> Vec<f64> {
 /// A law for the last reading, from the prior; the record's length and newest interval in days.
 fn law(rng: &mut Pcg64, length: f64, interval: f64) -> Option<Law> {
     let lowest = (SLOPES.0 / length).min(SLOWEST / interval);
-    let size = log_uniform(rng, lowest, SLOPES.1 / interval);
+    let size = log_uniform_by_exp(rng, lowest, SLOPES.1 / interval);
     let unresolved = size * interval / SLOPE_PER_INTERVAL;
     let kept = (lowest / size).powf(RARE) * (-0.5 * unresolved * unresolved).exp();
     if rng.random::<f64>() >= kept {
@@ -173,7 +162,7 @@ fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<Drawn> {
     let end = times[count - 1];
     let late = starts == Starts::ToBeFound && rng.random::<bool>();
     let onset = if late {
-        let ago = log_uniform(rng, end - times[count - 5], end);
+        let ago = log_uniform_by_exp(rng, end - times[count - 5], end);
         times.iter().copied().find(|time| *time >= end - ago)?
     } else {
         0.0
@@ -192,7 +181,7 @@ fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<Drawn> {
         size(rng, REMEMBERED)
     };
     let scatter = (size(rng, SCATTER), remembered);
-    let memory = log_uniform(rng, end / count as f64, end);
+    let memory = log_uniform_by_exp(rng, end / count as f64, end);
     let measured = match rng.random_range(0..20) {
         0..9 => Measured::Velocity,
         9..12 => Measured::VelocityWithSigma,

@@ -6,7 +6,6 @@
 //! an rms of `SHOWS` times the noise (log-uniform, for the weakest effect), and draws in which this noise is no
 //! noise of an instrument are dropped. Effects of the reading have their sizes in multiples of the noise.
 
-use super::chance::{log_uniform, so, uniform};
 use super::family::{Family, Range, Recipe};
 use super::instrument::Instrument;
 use super::read::{self, Slope};
@@ -19,6 +18,7 @@ use rand_pcg::Pcg64;
 use slipwatch::effects::{self, Kind};
 use slipwatch::fit::{ConstantLoad, Exponent, PointReadings};
 use slipwatch::reading::{Channel, Quantity, Sample, Series};
+use studies::random::{happens, log_uniform_by_exp, uniform};
 
 /// One drawn slope: the series to explain, what stands beside it, and the truth.
 #[derive(Debug, Clone)]
@@ -128,7 +128,7 @@ fn attempt(rng: &mut Pcg64, family: Family, recipe: &Recipe) -> Option<Drawn> {
             },
     };
     let remembers =
-        so(rng, REMEMBERS) && !plan.has(Kind::CORRELATED_NOISE) && !plan.effects.is_empty();
+        happens(rng, REMEMBERS) && !plan.has(Kind::CORRELATED_NOISE) && !plan.effects.is_empty();
     let background = remembers.then(|| Instrument::Remembering {
         memory: uniform(rng, 2.0, 5.0) * scene.schedule.interval,
         noises: uniform(rng, 0.7, 1.2),
@@ -223,9 +223,9 @@ fn noise(
         Quantity::Velocity => SHARE_OF_VELOCITY,
     };
     let noise = if weakest.is_finite() {
-        weakest / log_uniform(rng, SHOWS.0, SHOWS.1)
+        weakest / log_uniform_by_exp(rng, SHOWS.0, SHOWS.1)
     } else {
-        log_uniform(rng, most / 50.0, most)
+        log_uniform_by_exp(rng, most / 50.0, most)
     };
     for one in &mut plan.effects {
         if !matches!(&one.place, Place::Instrument(one) if !matches!(one, Instrument::IntervalMean { .. }))
@@ -255,8 +255,8 @@ fn shows(slope: &Slope, series: &Series, prediction: &[f64]) -> bool {
 /// How many mm the slope slips where its path slips 1.
 fn size(rng: &mut Pcg64, scene: &Scene, whole: &Path, noise: f64) -> Option<f64> {
     let mm = match scene.quantity {
-        Quantity::Displacement => log_uniform(rng, NOISE_MM.0, NOISE_MM.1) / noise,
-        Quantity::Velocity => log_uniform(rng, FIRST_VELOCITY.0, FIRST_VELOCITY.1),
+        Quantity::Displacement => log_uniform_by_exp(rng, NOISE_MM.0, NOISE_MM.1) / noise,
+        Quantity::Velocity => log_uniform_by_exp(rng, FIRST_VELOCITY.0, FIRST_VELOCITY.1),
     };
     let fastest = whole.velocity.iter().copied().fold(0.0, f64::max);
     (whole.displacement.last()? * mm < FARTHEST_MM && fastest * mm < FASTEST).then_some(mm)

@@ -1,10 +1,10 @@
 //! The families of series: one for each kind of effect, and those with none, two, or one outside the table.
 
-use super::chance::{one_of, so};
 use super::laws::{self, Character};
 use super::schedule::Need;
 use rand_pcg::Pcg64;
 use slipwatch::effects::Kind;
+use studies::random::{happens, one_of};
 
 /// What a family's series have in them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -95,7 +95,7 @@ impl Family {
         let kinds = match self {
             Self::Of(kind) if kind == Kind::NONE => Vec::new(),
             // A mean is recognised by what it blurs: a step, or the last rise.
-            Self::Of(kind) if kind == Kind::INTERVAL_MEAN && so(rng, 0.5) => {
+            Self::Of(kind) if kind == Kind::INTERVAL_MEAN && happens(rng, 0.5) => {
                 vec![Kind::INTERVAL_MEAN, Kind::LOAD_STEP]
             }
             Self::Of(kind) => vec![kind],

@@ -1,7 +1,6 @@
 //! Effects inside the law, drawn for a scene: loads, jumps of the state, changes of the friction, loads that
 //! follow the motion, and loads that no label fits.
 
-use super::chance::{log_uniform, normal, one_of, sign, so, uniform};
 use super::laws;
 use super::scene::{Place, Planned, Scene};
 use super::slope::{SlopeEffect, path};
@@ -11,6 +10,7 @@ use rand_pcg::Pcg64;
 use slipwatch::effects::{Form, Kind};
 use slipwatch::model::Load;
 use std::f64::consts::TAU;
+use studies::random::{happens, log_uniform_by_exp, normal, one_of, sign, uniform};
 
 /// Days of the principal lunar and solar tides and of the lunar diurnal one.
 const M2: f64 = 12.420_601_2 / 24.0;
@@ -49,7 +49,7 @@ fn driven(rng: &mut Pcg64, scene: &Scene, weather: &Weather) -> Option<Planned> 
         shape: one_of(rng, &[(0.6, 1), (0.2, 2), (0.2, 3)]),
     };
     let is_reservoir = weather.covariate == Covariate::Reservoir;
-    let form = if is_reservoir && so(rng, 0.5) {
+    let form = if is_reservoir && happens(rng, 0.5) {
         Form::Rate
     } else {
         Form::Level
@@ -71,7 +71,7 @@ fn driven(rng: &mut Pcg64, scene: &Scene, weather: &Weather) -> Option<Planned> 
     if spread <= 0.0 {
         return None;
     }
-    let gain = sign * log_uniform(rng, 0.3, 1.2);
+    let gain = sign * log_uniform_by_exp(rng, 0.3, 1.2);
     let knots = felt
         .into_iter()
         .map(|(day, value)| (day, gain * (value - mean) / spread))
@@ -96,8 +96,8 @@ fn sampled(scene: &Scene, step: f64, f: impl Fn(f64) -> f64) -> SlopeEffect {
 }
 
 fn seasonal(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
-    let (yearly, phase) = (log_uniform(rng, 0.25, 1.0), uniform(rng, 0.0, TAU));
-    let half = if so(rng, 0.5) {
+    let (yearly, phase) = (log_uniform_by_exp(rng, 0.25, 1.0), uniform(rng, 0.0, TAU));
+    let half = if happens(rng, 0.5) {
         yearly * uniform(rng, 0.1, 0.4)
     } else {
         0.0
@@ -114,7 +114,7 @@ fn seasonal(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
 }
 
 fn tide(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
-    let lunar = log_uniform(rng, 0.2, 0.8);
+    let lunar = log_uniform_by_exp(rng, 0.2, 0.8);
     let parts = [
         (M2, lunar),
         (S2, lunar * uniform(rng, 0.2, 0.5)),
@@ -134,7 +134,7 @@ fn tide(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
 }
 
 fn step_of(rng: &mut Pcg64) -> f64 {
-    sign(rng, 0.5) * log_uniform(rng, 0.4, 1.5)
+    sign(rng, 0.5) * log_uniform_by_exp(rng, 0.4, 1.5)
 }
 
 fn load_step(rng: &mut Pcg64, scene: &Scene) -> Planned {
@@ -149,7 +149,7 @@ fn load_step(rng: &mut Pcg64, scene: &Scene) -> Planned {
 fn state_reset(rng: &mut Pcg64, scene: &Scene) -> Planned {
     let day = scene.some_day(rng);
     let factor = loop {
-        let factor: f64 = log_uniform(rng, 0.3, 3.0);
+        let factor: f64 = log_uniform_by_exp(rng, 0.3, 3.0);
         if factor.ln().abs() > 0.25 {
             break factor;
         }
@@ -173,7 +173,7 @@ fn friction_change(rng: &mut Pcg64, scene: &Scene) -> Planned {
 }
 
 fn rate_limit(rng: &mut Pcg64) -> Planned {
-    let eta = log_uniform(rng, 0.02, 0.6);
+    let eta = log_uniform_by_exp(rng, 0.02, 0.6);
     let mut truth = TrueEffect::of(Kind::RATE_LIMIT);
     truth.size = Some(eta);
     truth.unit = Some("day/mm".to_owned());
@@ -183,7 +183,7 @@ fn rate_limit(rng: &mut Pcg64) -> Planned {
 fn geometry(rng: &mut Pcg64, scene: &Scene) -> Planned {
     let alone = path(&scene.law, &[], &[0.0, scene.length()]);
     let slip = alone.map_or(scene.length(), |path| path.displacement[1]);
-    let k = log_uniform(rng, 0.5, 8.0) / slip;
+    let k = log_uniform_by_exp(rng, 0.5, 8.0) / slip;
     let mut truth = TrueEffect::of(Kind::GEOMETRY);
     truth.size = Some(k);
     truth.unit = Some("1/mm".to_owned());
@@ -205,7 +205,7 @@ fn parting(rng: &mut Pcg64, scene: &Scene) -> Planned {
 /// A load outside the table.
 fn outside(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
     let length = scene.length();
-    let size = sign(rng, 0.5) * log_uniform(rng, 0.5, 1.5);
+    let size = sign(rng, 0.5) * log_uniform_by_exp(rng, 0.5, 1.5);
     let mut truth = TrueEffect::of(Kind::UNEXPLAINED);
     truth.size = Some(size);
     let fine = length / 2000.0;

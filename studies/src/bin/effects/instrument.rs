@@ -1,12 +1,12 @@
 //! Effects of the reading: offsets, temperature, means over an interval, noise that remembers.
 
-use super::chance::{count, log_uniform, normal, sign, so, uniform};
 use super::scene::{Planned, Scene};
 use super::truth::TrueEffect;
 use super::weather::{Covariate, Response, YEAR, moments};
 use rand_pcg::Pcg64;
 use slipwatch::effects::Kind;
 use slipwatch::model::Load;
+use studies::random::{count, happens, log_uniform_by_exp, normal, sign, uniform};
 
 /// One effect of the reading; sizes are in standard deviations of the white noise.
 #[derive(Debug, Clone)]
@@ -51,7 +51,7 @@ fn offsets(rng: &mut Pcg64, scene: &Scene) -> Option<Vec<Planned>> {
     }
     let mut planned = Vec::new();
     for day in days {
-        let noises = sign(rng, 0.5) * log_uniform(rng, 8.0, 40.0);
+        let noises = sign(rng, 0.5) * log_uniform_by_exp(rng, 8.0, 40.0);
         let read = &scene.schedule.days;
         let before = read.partition_point(|one| *one < day) as f64 / read.len() as f64;
         let mut truth = TrueEffect::of(Kind::OFFSET);
@@ -71,10 +71,10 @@ fn thermal(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
         .weather
         .iter()
         .find(|one| one.covariate == Covariate::Temperature)?;
-    let mean_delay = if so(rng, 0.3) {
+    let mean_delay = if happens(rng, 0.3) {
         0.0
     } else {
-        log_uniform(rng, 0.5, 12.0) * scene.schedule.interval.max(weather.step)
+        log_uniform_by_exp(rng, 0.5, 12.0) * scene.schedule.interval.max(weather.step)
     };
     let response = Response {
         mean_delay,
@@ -91,7 +91,7 @@ fn thermal(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
     if spread < 1e-6 {
         return None;
     }
-    let noises = sign(rng, 0.5) * log_uniform(rng, 3.0, 12.0);
+    let noises = sign(rng, 0.5) * log_uniform_by_exp(rng, 3.0, 12.0);
     let mut truth = TrueEffect::of(Kind::THERMAL);
     truth.channel = Some(Covariate::Temperature.name().to_owned());
     truth.lag_days = Some(mean_delay);
@@ -106,7 +106,7 @@ fn thermal(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
 }
 
 fn yearly(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
-    let noises = log_uniform(rng, 2.0, 8.0);
+    let noises = log_uniform_by_exp(rng, 2.0, 8.0);
     let mut truth = TrueEffect::of(Kind::SEASONAL_READING);
     truth.period_days = Some(YEAR);
     truth.unit = Some("mm".to_owned());
@@ -117,7 +117,7 @@ fn yearly(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
 }
 
 fn interval_mean(rng: &mut Pcg64, scene: &Scene) -> Planned {
-    let window = log_uniform(rng, 2.0, 20.0).round() * scene.schedule.interval;
+    let window = log_uniform_by_exp(rng, 2.0, 20.0).round() * scene.schedule.interval;
     let mut truth = TrueEffect::of(Kind::INTERVAL_MEAN);
     truth.size = Some(window);
     truth.unit = Some("day".to_owned());
@@ -127,15 +127,15 @@ fn interval_mean(rng: &mut Pcg64, scene: &Scene) -> Planned {
 fn noise(rng: &mut Pcg64, scene: &Scene) -> Planned {
     let mut truth = TrueEffect::of(Kind::CORRELATED_NOISE);
     let interval = scene.schedule.interval;
-    if so(rng, 0.3) {
-        let noises = log_uniform(rng, 0.3, 1.0);
+    if happens(rng, 0.3) {
+        let noises = log_uniform_by_exp(rng, 0.3, 1.0);
         "random walk".clone_into(&mut truth.what);
         truth.rms_over_noise = noises * (scene.length() / interval / 6.0).sqrt();
         return Planned::instrument(Instrument::RandomWalk { interval, noises }, truth);
     }
     let most = (scene.length() / interval / 12.0).clamp(6.0, 50.0);
-    let memory = log_uniform(rng, 5.0, most) * interval;
-    let noises = log_uniform(rng, 1.5, 4.0);
+    let memory = log_uniform_by_exp(rng, 5.0, most) * interval;
+    let noises = log_uniform_by_exp(rng, 1.5, 4.0);
     "AR(1)".clone_into(&mut truth.what);
     truth.lag_days = Some(memory);
     truth.rms_over_noise = noises;

@@ -1,9 +1,9 @@
 //! Laws as slopes follow them: creeping, accelerating, saturating, slowing down, settling.
 
-use super::chance::{log_uniform, one_of, uniform};
 use rand_pcg::Pcg64;
 use slipwatch::model::Law;
 use studies::law_from_healing;
+use studies::random::{log_uniform_by_exp, one_of, uniform};
 
 /// What a slope does under a constant load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,38 +37,42 @@ pub(crate) fn draw(rng: &mut Pcg64, choices: &[(f64, Character)], length: f64) -
     match one_of(rng, choices) {
         Character::Creeping => {
             let p = stable_p(rng);
-            let relaxation = length * log_uniform(rng, 0.03, 2.0);
+            let relaxation = length * log_uniform_by_exp(rng, 0.03, 2.0);
             law_from_healing(1.0, -1.0 / (p * relaxation), 1.0, p)
         }
         Character::Accelerating => {
             let p = 1.0 - 1.0 / uniform(rng, 1.02, 1.7);
-            let s_theta = 1.0 + log_uniform(rng, 0.2, 10.0);
-            let duration = length * log_uniform(rng, 1.1, 4.0);
+            let s_theta = 1.0 + log_uniform_by_exp(rng, 0.2, 10.0);
+            let duration = length * log_uniform_by_exp(rng, 1.1, 4.0);
             failing(s_theta, p, duration)
         }
         Character::Failing => {
             let p = 1.0 - 1.0 / uniform(rng, 1.02, 1.7);
-            let s_theta = 1.0 + log_uniform(rng, 0.2, 10.0);
+            let s_theta = 1.0 + log_uniform_by_exp(rng, 0.2, 10.0);
             let duration = length * uniform(rng, 0.5, 1.15);
             failing(s_theta, p, duration)
         }
         Character::AtTheBrink => {
             let p = 1.0 - 1.0 / uniform(rng, 1.02, 1.7);
-            let s_theta = 1.0 + log_uniform(rng, 0.2, 10.0);
-            failing(s_theta, p, length * (1.0 + log_uniform(rng, 0.001, 0.03)))
+            let s_theta = 1.0 + log_uniform_by_exp(rng, 0.2, 10.0);
+            failing(
+                s_theta,
+                p,
+                length * (1.0 + log_uniform_by_exp(rng, 0.001, 0.03)),
+            )
         }
         Character::Saturating => {
-            let gain = log_uniform(rng, 2.0, 15.0);
+            let gain = log_uniform_by_exp(rng, 2.0, 15.0);
             relaxing(rng, gain, length)
         }
         Character::Hardening => {
             let p = 1.0 - 1.0 / uniform(rng, 1.05, 1.7);
-            let s_theta = log_uniform(rng, 0.05, 0.7);
-            let a = log_uniform(rng, 0.5, 20.0) / length;
+            let s_theta = log_uniform_by_exp(rng, 0.05, 0.7);
+            let a = log_uniform_by_exp(rng, 0.5, 20.0) / length;
             law_from_healing(1.0, a, s_theta, p)
         }
         Character::Settling => {
-            let gain = log_uniform(rng, 0.1, 0.6);
+            let gain = log_uniform_by_exp(rng, 0.1, 0.6);
             relaxing(rng, gain, length)
         }
     }
@@ -86,7 +90,7 @@ fn failing(s_theta: f64, p: f64, duration: f64) -> Law {
 fn relaxing(rng: &mut Pcg64, gain: f64, length: f64) -> Law {
     let p = stable_p(rng);
     let s_theta = gain.powf(-p);
-    let relaxation = length * log_uniform(rng, 0.1, 0.7);
+    let relaxation = length * log_uniform_by_exp(rng, 0.1, 0.7);
     // t* = 1 / (-kappa y^(p-1)) at the steady y = 1/gain.
     let a = 1.0 / (relaxation * -p * gain.powf(1.0 - p));
     law_from_healing(1.0, a, s_theta, p)

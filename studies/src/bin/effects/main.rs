@@ -5,7 +5,6 @@
 //!
 //! Development and judgement have seeds of their own: nothing is tuned on what is judged.
 
-mod chance;
 mod drawn;
 mod dump;
 mod family;

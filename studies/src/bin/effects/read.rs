@@ -1,11 +1,11 @@
 //! The reading of a slope: its benchmark and the benchmarks beside it, with noise and instruments' effects.
 
-use super::chance::{count, log_uniform, normal, one_of, so};
 use super::instrument::Instrument;
 use super::scene::Scene;
 use super::slope::{Path, SlopeEffect, path};
 use rand_pcg::Pcg64;
 use slipwatch::reading::{BenchmarkId, Quantity, Reading, Series, Unit};
+use studies::random::{count, happens, log_uniform_by_exp, normal, one_of};
 
 /// A path with its size and noise.
 #[derive(Debug, Clone, Copy)]
@@ -146,7 +146,7 @@ pub(crate) fn neighbours(
 ) -> Option<(Vec<Series>, Option<Groups>)> {
     let wanted = if is_parted {
         count(rng, 1, 4)
-    } else if so(rng, 0.25) {
+    } else if happens(rng, 0.25) {
         count(rng, 1, 3)
     } else {
         0
@@ -158,7 +158,7 @@ pub(crate) fn neighbours(
         // The first always stays behind, so that there are two groups.
         let stays = is_parted && (other.is_empty() || one_of(rng, &[(0.5, true), (0.5, false)]));
         let path = if stays { alone.as_ref()? } else { slope.seen };
-        let share = log_uniform(rng, 0.3, 3.0);
+        let share = log_uniform_by_exp(rng, 0.3, 3.0);
         let noiseless: Vec<f64> = slope
             .values(path)
             .iter()

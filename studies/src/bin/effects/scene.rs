@@ -1,6 +1,5 @@
 //! One slope before it is read: its law, the times, the weather, and the effects planned for it.
 
-use super::chance::{count, log_uniform, one_of, so, uniform};
 use super::family::Recipe;
 use super::instrument::Instrument;
 use super::laws;
@@ -12,6 +11,7 @@ use rand_pcg::Pcg64;
 use slipwatch::effects::Kind;
 use slipwatch::model::Law;
 use slipwatch::reading::{Quantity, Timestamp, after_days};
+use studies::random::{count, happens, log_uniform_by_exp, one_of, uniform};
 
 /// The slope and what is around it. Its law has unit velocity; the noise gives it a size later.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ impl Scene {
     pub(crate) fn draw(rng: &mut Pcg64, recipe: &Recipe) -> Option<Self> {
         let schedule = Schedule::draw(rng, recipe.need)?;
         let length = schedule.length();
-        let quantity = if so(rng, recipe.chance_of_velocity) {
+        let quantity = if happens(rng, recipe.chance_of_velocity) {
             Quantity::Velocity
         } else {
             Quantity::Displacement
@@ -90,7 +90,7 @@ impl Scene {
     pub(crate) fn mean_delay(&self, rng: &mut Pcg64, step: f64) -> f64 {
         let least = self.schedule.interval.max(step);
         let most = (self.length() / 8.0).min(60.0);
-        log_uniform(rng, least.min(most), most)
+        log_uniform_by_exp(rng, least.min(most), most)
     }
 }
 

@@ -1,8 +1,8 @@
 //! When a slope is read: hourly to monthly, even or not, with gaps.
 
-use super::chance::{count, log_uniform, one_of, so, uniform};
 use rand_pcg::Pcg64;
 use slipwatch::reading::SECONDS_PER_DAY;
+use studies::random::{count, happens, log_uniform_by_exp, one_of, uniform};
 
 /// Days of the nominal intervals.
 pub(crate) const HOURLY: f64 = 1.0 / 24.0;
@@ -66,8 +66,8 @@ impl Schedule {
         let interval = one_of(rng, need.intervals);
         let fewest = (need.least_days / interval).max(READINGS.0 as f64);
         let most = (LONGEST / interval).min(READINGS.1 as f64);
-        let wanted = log_uniform(rng, fewest.min(most), most);
-        let even = so(rng, 0.65);
+        let wanted = log_uniform_by_exp(rng, fewest.min(most), most);
+        let even = happens(rng, 0.65);
         (0..TRIES)
             .map(|_| Self::attempt(rng, interval, wanted, even))
             .find(|one| {
@@ -84,7 +84,7 @@ impl Schedule {
     fn attempt(rng: &mut Pcg64, interval: f64, wanted: f64, even: bool) -> Self {
         let length = wanted * interval;
         let gaps = gaps(rng, interval, length);
-        let lost = if so(rng, 0.5) {
+        let lost = if happens(rng, 0.5) {
             uniform(rng, 0.0, 0.1)
         } else {
             0.0
@@ -94,7 +94,7 @@ impl Schedule {
         while at < length {
             let shift = if even { 0.0 } else { uniform(rng, -0.35, 0.35) };
             let day = whole_seconds(at + shift * interval);
-            if !gaps.iter().any(|gap| day > gap.0 && day < gap.1) && !so(rng, lost) {
+            if !gaps.iter().any(|gap| day > gap.0 && day < gap.1) && !happens(rng, lost) {
                 days.push(day);
             }
             at += interval;
@@ -109,13 +109,13 @@ impl Schedule {
 
 /// In four records of ten, one to three of them.
 fn gaps(rng: &mut Pcg64, interval: f64, length: f64) -> Vec<(f64, f64)> {
-    if !so(rng, 0.4) {
+    if !happens(rng, 0.4) {
         return Vec::new();
     }
     (0..count(rng, 1, 3))
         .map(|_| {
             let from = uniform(rng, 0.05, 0.9) * length;
-            (from, from + interval * log_uniform(rng, 3.0, 30.0))
+            (from, from + interval * log_uniform_by_exp(rng, 3.0, 30.0))
         })
         .collect()
 }

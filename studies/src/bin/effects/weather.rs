@@ -2,9 +2,9 @@
 //!
 //! Each has a weather of its own, so that none is related to another but by the season.
 
-use super::chance::{log_uniform, normal, one_of, sign, so, uniform};
 use rand_pcg::Pcg64;
 use std::f64::consts::TAU;
+use studies::random::{happens, log_uniform_by_exp, normal, one_of, sign, uniform};
 
 pub(crate) const YEAR: f64 = 365.25;
 /// Days before the first reading over which the hidden weather runs, so that the slowest response has settled.
@@ -104,7 +104,7 @@ impl Weather {
             Covariate::Temperature => grid.temperature(rng),
             Covariate::PorePressure => grid.pore_pressure(rng),
         };
-        let lead = if so(rng, 0.7) {
+        let lead = if happens(rng, 0.7) {
             uniform(rng, 0.2, 1.0) * 180.0_f64.min(length)
         } else {
             0.0
@@ -204,9 +204,9 @@ impl Grid {
 
     /// Spells of rain, more of it in one half of the year; mm in a step.
     fn rain(&self, rng: &mut Pcg64) -> Vec<f64> {
-        let dry_days = log_uniform(rng, 2.0, 8.0);
-        let wet_days = log_uniform(rng, 0.4, 1.5);
-        let mm_per_day = log_uniform(rng, 6.0, 25.0);
+        let dry_days = log_uniform_by_exp(rng, 2.0, 8.0);
+        let wet_days = log_uniform_by_exp(rng, 0.4, 1.5);
+        let mm_per_day = log_uniform_by_exp(rng, 6.0, 25.0);
         let (phase, swing) = (uniform(rng, 0.0, TAU), uniform(rng, 0.0, 0.5));
         let mut is_wet = false;
         let mut heaviness = 1.0;
@@ -214,7 +214,7 @@ impl Grid {
             .map(|index| {
                 let wetness = 1.0 + swing * self.season(index, phase);
                 let spell = if is_wet { wet_days } else { dry_days / wetness };
-                if so(rng, 1.0 - (-self.step / spell).exp()) {
+                if happens(rng, 1.0 - (-self.step / spell).exp()) {
                     is_wet = !is_wet;
                     heaviness = (0.8 * normal(rng)).exp();
                 }
@@ -230,8 +230,8 @@ impl Grid {
     /// A year's filling and emptying, with the operators' own slower and faster changes.
     fn reservoir(&self, rng: &mut Pcg64) -> Vec<f64> {
         let phase = uniform(rng, 0.0, TAU);
-        let (metres, own_share) = (log_uniform(rng, 3.0, 20.0), uniform(rng, 0.25, 0.7));
-        let memory = log_uniform(rng, 4.0, 30.0);
+        let (metres, own_share) = (log_uniform_by_exp(rng, 3.0, 20.0), uniform(rng, 0.25, 0.7));
+        let memory = log_uniform_by_exp(rng, 4.0, 30.0);
         let own = self.random_process(rng, memory, 2);
         (0..self.count)
             .map(|index| {
@@ -246,12 +246,12 @@ impl Grid {
     fn river(&self, rng: &mut Pcg64) -> Vec<f64> {
         let rain = self.rain(rng);
         let recession = Response {
-            mean_delay: log_uniform(rng, 1.5, 10.0),
+            mean_delay: log_uniform_by_exp(rng, 1.5, 10.0),
             shape: 1,
         };
         let floods = delay(&rain, self.step, recession);
         let (mean, _) = moments(&floods);
-        let base = log_uniform(rng, 2.0, 60.0);
+        let base = log_uniform_by_exp(rng, 2.0, 60.0);
         let (phase, swing) = (uniform(rng, 0.0, TAU), uniform(rng, 0.1, 0.6));
         (0..self.count)
             .map(|index| {
@@ -265,7 +265,7 @@ impl Grid {
     /// The year, the day where the grid shows it, and a few days' weather.
     fn temperature(&self, rng: &mut Pcg64) -> Vec<f64> {
         let (yearly, daily) = (uniform(rng, 6.0, 12.0), uniform(rng, 2.0, 6.0));
-        let memory = log_uniform(rng, 1.5, 5.0);
+        let memory = log_uniform_by_exp(rng, 1.5, 5.0);
         let weather = self.random_process(rng, memory, 1);
         let (mean, spread) = (uniform(rng, 2.0, 12.0), uniform(rng, 2.0, 4.0));
         let (phase, hour) = (uniform(rng, 0.0, TAU), uniform(rng, 0.0, TAU));
@@ -289,12 +289,15 @@ impl Grid {
     fn pore_pressure(&self, rng: &mut Pcg64) -> Vec<f64> {
         let rain = self.rain(rng);
         let seepage = Response {
-            mean_delay: log_uniform(rng, 4.0, 40.0),
+            mean_delay: log_uniform_by_exp(rng, 4.0, 40.0),
             shape: one_of(rng, &[(0.5, 1), (0.5, 2)]),
         };
         let seeped = delay(&rain, self.step, seepage);
         let (mean, spread) = moments(&seeped);
-        let (base, swing) = (uniform(rng, 20.0, 120.0), log_uniform(rng, 1.0, 10.0));
+        let (base, swing) = (
+            uniform(rng, 20.0, 120.0),
+            log_uniform_by_exp(rng, 1.0, 10.0),
+        );
         seeped
             .iter()
             .map(|value| {

@@ -3,13 +3,13 @@
 use crate::judge::{Calls, Chances, FEWEST_READINGS};
 use crate::looks::{first, in_two};
 use crate::source;
-use rand::{Rng, RngExt, SeedableRng};
-use rand_distr::StandardNormal;
+use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use slipwatch::alert::Level;
 use slipwatch::fit::Observations;
 use slipwatch::forecast::Network;
 use std::fmt::Write as _;
+use studies::random::{happens, log_uniform, normal, uniform};
 
 const FIRST_SEED: u64 = 4_000_000;
 /// Ranges over which the logarithm is even: mm/day, mm, days between readings, days in all.
@@ -60,21 +60,17 @@ pub(crate) fn write(network: &Network, series: u64) -> anyhow::Result<()> {
     source::document("docs/steady-creep.md", &text(&called, series)?)
 }
 
-fn log_uniform((low, high): (f64, f64), generator: &mut impl Rng) -> f64 {
-    low * (high / low).powf(generator.random::<f64>())
-}
-
 /// The readings of a series, and when its rate changes, days.
 fn draw(seed: u64, doubles: bool) -> (Noise, Observations, f64) {
     let mut generator = Pcg64::seed_from_u64(2 * (FIRST_SEED + seed) + u64::from(doubles));
     let noise = NOISE_KINDS[usize::try_from(seed % 3).unwrap_or(0)];
-    let interval = log_uniform(INTERVALS, &mut generator);
+    let interval = log_uniform(&mut generator, INTERVALS.0, INTERVALS.1);
     let most = (READINGS.1 * interval).max(LENGTHS.0);
-    let days = log_uniform(LENGTHS, &mut generator).clamp(READINGS.0 * interval, most);
-    let rests = generator.random::<f64>() < AT_REST;
-    let rate = log_uniform(RATES, &mut generator) * f64::from(u8::from(!rests));
-    let size = log_uniform(NOISES, &mut generator);
-    let change = days * (CHANGES.0 + (CHANGES.1 - CHANGES.0) * generator.random::<f64>());
+    let days = log_uniform(&mut generator, LENGTHS.0, LENGTHS.1).clamp(READINGS.0 * interval, most);
+    let rests = happens(&mut generator, AT_REST);
+    let rate = log_uniform(&mut generator, RATES.0, RATES.1) * f64::from(u8::from(!rests));
+    let size = log_uniform(&mut generator, NOISES.0, NOISES.1);
+    let change = days * uniform(&mut generator, CHANGES.0, CHANGES.1);
     let mut flickers = [0.0; FLICKERS.len()];
     let mut values = Vec::new();
     let mut t_days = 0.0;
@@ -85,11 +81,11 @@ fn draw(seed: u64, doubles: bool) -> (Noise, Observations, f64) {
             0.0
         };
         let position = rate * (t_days + more);
-        let normal: f64 = generator.sample(StandardNormal);
+        let drawn = normal(&mut generator);
         let value = match noise {
-            Noise::White => position + size * normal,
+            Noise::White => position + size * drawn,
             Noise::Flicker => position + size * flicker(&mut flickers, &mut generator),
-            Noise::Quantised => ((position + FINE * size * normal) / size).round() * size,
+            Noise::Quantised => ((position + FINE * size * drawn) / size).round() * size,
         };
         values.push((t_days, value));
         t_days += interval;
@@ -100,8 +96,7 @@ fn draw(seed: u64, doubles: bool) -> (Noise, Observations, f64) {
 fn flicker(each: &mut [f64; FLICKERS.len()], generator: &mut impl Rng) -> f64 {
     for (one, power) in each.iter_mut().zip(FLICKERS) {
         let kept = (-f64::powi(4.0, -power)).exp();
-        let normal: f64 = generator.sample(StandardNormal);
-        *one = kept * *one + (1.0 - kept * kept).sqrt() * normal;
+        *one = kept * *one + (1.0 - kept * kept).sqrt() * normal(generator);
     }
     each.iter().sum::<f64>() / (FLICKERS.len() as f64).sqrt()
 }
