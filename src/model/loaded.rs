@@ -11,7 +11,7 @@ use super::coefficients::Coefficients;
 use super::law::{Law, LawError};
 use super::load::{Load, LoadStretch};
 use super::relaxation::Relaxation;
-use super::taylor::{PowerSeries, radius, unit_days};
+use super::taylor::{BlockPoint, PowerSeries, radius, unit_days};
 use super::trajectory::Motion;
 use std::ops::ControlFlow;
 
@@ -169,13 +169,16 @@ impl<'a> LoadedLaw<'a> {
         }
         let gain = stretch.log_load.exp();
         let coefficients = Coefficients::under(&self.law, gain);
-        let at = (block.y, block.slip / gain);
+        let at = BlockPoint {
+            y: block.y,
+            slip: block.slip / gain,
+        };
         Relaxation::new(&coefficients, self.order_of_relaxation, block.t, at)
             .filter(|relaxation| relaxation.end.is_infinite())
     }
 
     fn motion(&self, step: &TaylorStep, t: f64) -> Motion {
-        let (y, slip) = step.at(t);
+        let BlockPoint { y, slip } = step.at(t);
         Motion {
             y,
             velocity: self.law.v_i * step.log_load(t).exp() / y,
@@ -195,7 +198,7 @@ impl<'a> LoadedLaw<'a> {
             step.end
         };
         // Past the singularity y is not a number of the law.
-        let passed = |t: f64| reaches(t) || step.at(t).0 <= 0.0;
+        let passed = |t: f64| reaches(t) || step.at(t).y <= 0.0;
         passed(top).then(|| first(&TaylorStep { end: top, ..*step }, passed))
     }
 }
@@ -275,7 +278,7 @@ impl TaylorStep {
         if stands {
             return Next::Lost;
         }
-        let (y, slip) = self.at(self.end);
+        let BlockPoint { y, slip } = self.at(self.end);
         if !(y > 0.0 && y.is_finite() && slip.is_finite()) {
             return Next::Lost;
         }
@@ -291,11 +294,12 @@ impl TaylorStep {
         self.stretch.log_load + self.stretch.per_day * (t - self.series.start)
     }
 
-    /// (y, `slip / v_i`) at time `t`.
-    fn at(&self, t: f64) -> (f64, f64) {
+    /// Where the block is at time `t`, days.
+    fn at(&self, t: f64) -> BlockPoint {
         if let Some(relaxation) = &self.relaxation {
-            let (y, slip) = relaxation.at(t);
-            return (y, slip * self.stretch.log_load.exp());
+            let BlockPoint { y, slip } = relaxation.at(t);
+            let slip = slip * self.stretch.log_load.exp();
+            return BlockPoint { y, slip };
         }
         self.series.at(t)
     }
@@ -318,7 +322,7 @@ impl TaylorStep {
         for k in (1..=order).rev() {
             slope = slope * h + k as f64 * y[k];
         }
-        self.stretch.per_day * unit - slope / self.at(t).0
+        self.stretch.per_day * unit - slope / self.at(t).y
     }
 }
 

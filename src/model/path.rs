@@ -5,13 +5,13 @@ use super::coefficients::Coefficients;
 use super::law::Law;
 use super::relaxation::Relaxation;
 use super::tail;
-use super::taylor::Segment;
+use super::taylor::{BlockPoint, Segment};
 
-/// Where the segments stop and the last stretch before failure begins: (y, `slip / v_i`) then.
+/// Where the segments stop and the last stretch before failure begins, and where the block is then.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tail {
     pub(super) start: f64,
-    pub(super) at: (f64, f64),
+    pub(super) at: BlockPoint,
     pub(super) failure_days: f64,
 }
 
@@ -27,8 +27,8 @@ pub(super) struct SolutionPath {
 /// What holds at a time asked for.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum PathPlace {
-    /// (y, `slip / v_i`).
-    At((f64, f64)),
+    /// Where the block is.
+    At(BlockPoint),
     /// So many days before the failure, on the tail.
     BeforeFailure(f64),
     /// Past the failure, or past what was solved.
@@ -58,7 +58,7 @@ impl SolutionPath {
         (self.departure, self.arrival, self.tail) = (None, None, None);
         let fails = tail::fails_from(law, 0.0);
         let order = accuracy.order();
-        let (mut t, mut at) = (0.0, (1.0, 0.0));
+        let (mut t, mut at) = (0.0, BlockPoint { y: 1.0, slip: 0.0 });
         self.departure = Relaxation::new(coefficients, order, t, at);
         if let Some(departure) = &self.departure {
             if departure.end > end_days {
@@ -68,7 +68,7 @@ impl SolutionPath {
             at = departure.at(t);
         }
         while t <= end_days && self.segments.len() < accuracy.most_segments() {
-            if fails && at.0.ln() < accuracy.ln_y_of_tail() {
+            if fails && at.y.ln() < accuracy.ln_y_of_tail() {
                 self.tail = Some(Tail {
                     start: t,
                     at,
@@ -89,7 +89,7 @@ impl SolutionPath {
             let next = t + segment.span;
             at = segment.at(next);
             self.segments.push(segment);
-            let (y, slip) = (at.0, at.1);
+            let BlockPoint { y, slip } = at;
             if !(next > t && y > 0.0 && y.is_finite() && slip.is_finite()) {
                 return;
             }
@@ -126,7 +126,7 @@ impl SolutionPath {
         match self.segments.get(index) {
             Some(segment) if t <= segment.start() + segment.span * (1.0 + 1e-9) => {
                 let at = segment.at(t);
-                if at.0 > 0.0 {
+                if at.y > 0.0 {
                     PathPlace::At(at)
                 } else {
                     PathPlace::Nowhere

@@ -5,7 +5,7 @@
 //! from it at any time, and what matters beside the steady state, z - 1, is never a difference.
 
 use super::coefficients::Coefficients;
-use super::taylor::{MAX_ORDER, TaylorSeries, radius, step_fraction};
+use super::taylor::{BlockPoint, MAX_ORDER, TaylorSeries, radius, step_fraction};
 
 /// Beyond this |z - 1| max(1, |p - 1|) the series is not worth trying.
 const FARTHEST_DISTANCE: f64 = 0.4;
@@ -30,19 +30,19 @@ pub(super) struct Relaxation {
 }
 
 impl Relaxation {
-    /// From `at`, (y, `slip / v_i`) at `start`; `None` where the steady state is far or is not.
+    /// From where the block is `at` at `start`; `None` where the steady state is far or is not.
     pub(super) fn new(
         law: &Coefficients,
         order: usize,
         start: f64,
-        at: (f64, f64),
+        at: BlockPoint,
     ) -> Option<Self> {
         if law.kappa == 0.0 {
             return None;
         }
         let ln_y_steady = law.ln_y_steady();
         let stretch = (law.p - 1.0).abs().max(1.0);
-        let ln_z = at.0.ln() - ln_y_steady;
+        let ln_z = at.y.ln() - ln_y_steady;
         // NaN, where there is no steady state.
         let distance = ln_z.abs() * stretch;
         if distance.is_nan() || distance >= FARTHEST_DISTANCE {
@@ -63,15 +63,15 @@ impl Relaxation {
             rate,
             y_steady: ln_y_steady.exp(),
             departure,
-            slip: at.1,
+            slip: at.slip,
             order,
             z,
             u,
         })
     }
 
-    /// (y, `slip / v_i`) at time `t`.
-    pub(super) fn at(&self, t: f64) -> (f64, f64) {
+    /// Where the block is at time `t`, days.
+    pub(super) fn at(&self, t: f64) -> BlockPoint {
         let days = t - self.start;
         let decay = (-self.rate) * days;
         let departure = self.departure * decay.exp();
@@ -88,7 +88,10 @@ impl Relaxation {
             gained += self.u[k] * lost * (1.0 / k as f64);
         }
         let slip = self.slip + (days + gained / self.rate) / self.y_steady;
-        (y * self.y_steady, slip)
+        BlockPoint {
+            y: y * self.y_steady,
+            slip,
+        }
     }
 }
 

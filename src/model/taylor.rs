@@ -8,6 +8,15 @@ pub(super) const MAX_ORDER: usize = 30;
 /// The coefficients of one polynomial.
 pub(super) type TaylorSeries = [f64; MAX_ORDER + 1];
 
+/// Where the block is at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct BlockPoint {
+    /// Its inverse velocity over that at t = 0.
+    pub(super) y: f64,
+    /// Its slip over `v_i`, days.
+    pub(super) slip: f64,
+}
+
 /// y(t) and the slip over `v_i` from `start`, as polynomials in (t - start) / `unit` of N coefficients at most.
 ///
 /// The unit, days, is the law's own time there: in days the coefficients of a slope that takes 1e12 of them, or
@@ -22,8 +31,8 @@ pub(super) struct PowerSeries<const N: usize> {
 }
 
 impl<const N: usize> PowerSeries<N> {
-    /// (y, `slip / v_i`) at time `t`.
-    pub(super) fn at(&self, t: f64) -> (f64, f64) {
+    /// Where the block is at time `t`, days.
+    pub(super) fn at(&self, t: f64) -> BlockPoint {
         let h = (t - self.start) / self.unit;
         let mut y = self.y[self.order];
         let mut slip = self.slip[self.order];
@@ -31,7 +40,7 @@ impl<const N: usize> PowerSeries<N> {
             y = y * h + self.y[k];
             slip = slip * h + self.slip[k];
         }
-        (y, slip)
+        BlockPoint { y, slip }
     }
 }
 
@@ -43,12 +52,12 @@ pub(super) struct Segment {
 }
 
 impl Segment {
-    /// Expands the law about `start`, where the inverse velocity is `y_0` and the slip `slip_0`.
+    /// Expands the law about `start`, where the block is `at`.
     ///
     /// With G = kappa bc(y; p) and K = kappa y^p = kappa + p G: y' = -r + G and y G' = y' K; with u = 1/y:
     /// y u = 1. G and K are of the size of the law's own rates, where bc and y^p alone leave the range of f64.
-    pub(super) fn expand(law: &Coefficients, order: usize, start: f64, at: (f64, f64)) -> Self {
-        let (y_0, slip_0) = at;
+    pub(super) fn expand(law: &Coefficients, order: usize, start: f64, at: BlockPoint) -> Self {
+        let (y_0, slip_0) = (at.y, at.slip);
         let mut y = [0.0; MAX_ORDER + 1];
         let mut slip = [0.0; MAX_ORDER + 1];
         let mut u = [0.0; MAX_ORDER + 1];
@@ -103,8 +112,8 @@ impl Segment {
         self.series.start
     }
 
-    /// (y, `slip / v_i`) at time `t`.
-    pub(super) fn at(&self, t: f64) -> (f64, f64) {
+    /// Where the block is at time `t`, days.
+    pub(super) fn at(&self, t: f64) -> BlockPoint {
         self.series.at(t)
     }
 }

@@ -5,6 +5,7 @@ use super::coefficients::Coefficients;
 use super::law::Law;
 use super::path::{PathPlace, SolutionPath};
 use super::tail;
+use super::taylor::BlockPoint;
 
 /// Position on a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,7 +55,7 @@ impl Trajectory {
     /// The motion `t` days after the start; `None` from the singularity on.
     pub fn at(&self, t: f64) -> Option<Motion> {
         match self.path.place(t) {
-            PathPlace::At((y, slip)) => Some(self.motion(y, slip)),
+            PathPlace::At(at) => Some(self.motion(at)),
             PathPlace::BeforeFailure(remaining) => self.before_failure(remaining),
             PathPlace::Nowhere => None,
         }
@@ -69,9 +70,9 @@ impl Trajectory {
         if remaining > tail.failure_days - tail.start {
             return self.at(tail.failure_days - remaining);
         }
-        let ln_y_start = tail.at.0.ln();
+        let ln_y_start = tail.at.y.ln();
         let ln_y = tail::ln_y_with_remaining(&self.law, remaining, ln_y_start);
-        let slip = tail.at.1 + tail::slip_between(&self.law, ln_y_start, ln_y);
+        let slip = tail.at.slip + tail::slip_between(&self.law, ln_y_start, ln_y);
         Some(Motion {
             y: ln_y.exp(),
             velocity: self.law.v_i * (-ln_y).exp(),
@@ -79,7 +80,7 @@ impl Trajectory {
         })
     }
 
-    fn motion(&self, y: f64, slip: f64) -> Motion {
+    fn motion(&self, BlockPoint { y, slip }: BlockPoint) -> Motion {
         Motion {
             y,
             velocity: self.law.v_i / y,
