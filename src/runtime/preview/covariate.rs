@@ -1,7 +1,7 @@
 //! The values of one covariate, and what in them hardly means what was intended.
 
 use super::view::CovariateView;
-use crate::reading::{CovariateKind, RunningTotal, Timestamp, suspicion};
+use crate::reading::{CovariateKind, RunningTotal, Sample, Timestamp, suspicion};
 use jiff::civil::Time;
 use jiff::tz::TimeZone;
 
@@ -22,7 +22,7 @@ impl PreviewCovariate {
         }
     }
 
-    pub(super) fn take(&mut self, (time, value): (Timestamp, f64)) {
+    pub(super) fn take(&mut self, Sample { time, value }: Sample) {
         let view = &mut self.view;
         view.values += 1;
         (view.first, view.last) = (view.first.min(time), view.last.max(time));

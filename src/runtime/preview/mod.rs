@@ -23,7 +23,7 @@ use super::tail::{Arrival, Decoder, LinesRead, TextReader, list};
 use crate::config::{Config, FileSource, SourceKind};
 use crate::monitor::{Declared, Input};
 use crate::reading::{
-    BenchmarkId, CovariateKind, LocalClock, MissingValues, Quantity, SummerTime, Suspicion,
+    BenchmarkId, CovariateKind, LocalClock, MissingValues, Quantity, Sample, SummerTime, Suspicion,
     Timestamp, suspicion,
 };
 use crate::store::Store;
@@ -330,7 +330,10 @@ impl PreviewSoFar {
         {
             let key = (source.clone(), benchmark.clone(), unit.quantity());
             let accepted = self.accepted.get(&benchmark).cloned().unwrap_or_default();
-            let here = (time, reading.value);
+            let here = Sample {
+                time,
+                value: reading.value,
+            };
             let declared = &self.declared;
             let track = self.benchmarks.entry(key).or_insert_with(|| {
                 let resets = DeclaredResets::of(declared, &benchmark);
@@ -356,7 +359,10 @@ impl PreviewSoFar {
     }
 
     fn sample(&mut self, one: CovariateView, value: f64) {
-        let here = (one.first, value);
+        let here = Sample {
+            time: one.first,
+            value,
+        };
         let key = (one.source.clone(), one.name.clone());
         let so_far = self.covariates.entry(key);
         so_far

@@ -4,7 +4,8 @@ use super::resets::DeclaredResets;
 use super::view::BenchmarkPreview;
 use crate::reading::other_unit::{self, OtherUnit};
 use crate::reading::{
-    LocalClock, Quantity, SummerTime, Suspicion, Timestamp, Unit, suspicion, upper_median_by,
+    LocalClock, Quantity, Sample, SummerTime, Suspicion, Timestamp, Unit, suspicion,
+    upper_median_by,
 };
 use jiff::tz::TimeZone;
 use std::collections::BTreeSet;
@@ -108,7 +109,7 @@ impl PreviewTrack {
     /// A reading in `unit`, which the daemon takes, or holds where it lies too far ahead.
     pub(super) fn take(
         &mut self,
-        (time, value): (Timestamp, f64),
+        Sample { time, value }: Sample,
         unit: Unit,
         place: FilePlace,
         is_ahead: bool,

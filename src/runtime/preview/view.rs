@@ -1,7 +1,7 @@
 //! What a look at a site's files has found.
 
 use crate::config::ConfigProblem;
-use crate::reading::{BenchmarkId, CovariateKind, Quantity, Timestamp, Unit};
+use crate::reading::{BenchmarkId, CovariateKind, Quantity, Sample, Timestamp, Unit};
 use crate::runtime::ingest::Meaning;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -147,7 +147,7 @@ impl BenchmarkPreview {
         id: BenchmarkId,
         source: String,
         unit: Unit,
-        first: (Timestamp, f64),
+        Sample { time, value }: Sample,
     ) -> Self {
         Self {
             id,
@@ -160,8 +160,8 @@ impl BenchmarkPreview {
             ahead: 0,
             missing: 0,
             out_of_range: 0,
-            first,
-            last: first,
+            first: (time, value),
+            last: (time, value),
             moved_mm: None,
             every_s: None,
             suspicions: Vec::new(),
