@@ -205,7 +205,7 @@ impl Indicators {
         let (mut all, mut counted) = (Vec::new(), Vec::new());
         let accelerating = self.accelerating();
         for (power, days) in spans(&self.scales) {
-            let creeps = (1.0 - accelerating) * (1.0 - may_grow(&self.scales, (power, days)));
+            let creeps = (1.0 - accelerating) * (1.0 - may_grow(&self.scales, power, days));
             let chance = network.chance(&self.inputs(members, power, days)) * (1.0 - creeps);
             reached = reached.max(chance);
             let goes_on = goes_on(&self.scales, power, accelerating);
@@ -317,8 +317,8 @@ fn is_fast(scales: &Scales, power: usize) -> f64 {
 
 /// The share of the chance within such a span that is reported of a slope that may creep steadily: all scales
 /// count together.
-fn may_grow(scales: &Scales, span: (usize, f64)) -> f64 {
-    let each = growth(scales, span).map(|ln| ln.min(ONE_SCALE));
+fn may_grow(scales: &Scales, power: usize, span: f64) -> f64 {
+    let each = growth(scales, power, span).map(|ln| ln.min(ONE_SCALE));
     STEADY + (1.0 - STEADY) * share(each.sum())
 }
 
@@ -331,7 +331,7 @@ fn share(ln_ratio: f64) -> f64 {
 /// ln of the likelihood ratio of growth against none, at the scale `power`, whose span is `span` days, and each shorter one. A
 /// straight line in inverse velocity that meets zero after the span D grows by s / (D + 2 s) of itself from one block of s days
 /// to the next; [`UNEVEN`] is the standard deviation of that, as a share of it.
-fn growth(scales: &Scales, (power, span): (usize, f64)) -> impl Iterator<Item = f64> {
+fn growth(scales: &Scales, power: usize, span: f64) -> impl Iterator<Item = f64> {
     let shorter = power.saturating_sub(GROWN_SCALES);
     let last = (power + 1).min(scales.each.len());
     let each = scales.each.get(shorter..last).unwrap_or_default().iter();
