@@ -2,7 +2,7 @@
 
 use super::event::{AlertState, Event, EventKind};
 use crate::alert::Level;
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, TimeSpan, Timestamp};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -20,15 +20,15 @@ pub struct LevelStretch {
     pub is_in_force: bool,
 }
 
-/// Every stretch of one level within `first` and `last`; then those in which it was unknown, which stand beside
+/// Every stretch of one level within `span`; then those in which it was unknown, which stand beside
 /// the level. `None`: of the whole site.
 pub fn levels_in(
     events: &[Event],
     benchmark: Option<&BenchmarkId>,
-    (first, last): (Timestamp, Timestamp),
+    span: TimeSpan,
 ) -> (Vec<LevelStretch>, Vec<LevelStretch>) {
-    let mut levels = LevelCourse::new(Level::Green, first);
-    let mut unknown = LevelCourse::new(Level::Green, first);
+    let mut levels = LevelCourse::new(Level::Green, span.from);
+    let mut unknown = LevelCourse::new(Level::Green, span.from);
     for event in events {
         let EventKind::Alert { level, state, .. } = &event.kind else {
             continue;
@@ -49,9 +49,9 @@ pub fn levels_in(
             AlertState::Resolved => {}
         }
     }
-    let mut unknown = unknown.until(last);
+    let mut unknown = unknown.until(span.to);
     unknown.retain(|stretch| stretch.level == Level::Unknown);
-    (levels.until(last), unknown)
+    (levels.until(span.to), unknown)
 }
 
 /// `events` by the times that they are of: those of the past before a first start are found after those of the present. No alert ends

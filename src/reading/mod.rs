@@ -16,6 +16,7 @@ mod recording;
 mod running_total;
 mod series;
 pub mod suspicion;
+mod time_span;
 mod unit;
 
 pub use conventions::{Conventions, LocalClock, MissingValues, SummerTime, TimeFault};
@@ -31,6 +32,7 @@ pub use recording::{MergeError, Recording, SelectError};
 pub use running_total::RunningTotal;
 pub use series::{Channel, Disorder, Reading, Sample, Series};
 pub use suspicion::Suspicion;
+pub use time_span::TimeSpan;
 pub use unit::{LengthUnit, Quantity, TimeUnit, Unit, UnitError, bracketed, in_brackets};
 
 use jiff::SignedDuration;

@@ -1,6 +1,6 @@
 //! A benchmark's readings and the covariates beside them, in time order.
 
-use super::{BenchmarkId, CovariateKind, Quantity, Timestamp, Unit};
+use super::{BenchmarkId, CovariateKind, Quantity, TimeSpan, Timestamp, Unit};
 use jiff::SignedDuration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -40,6 +40,12 @@ pub struct Series {
 }
 
 impl Series {
+    /// From the first reading to the last; `None` without any.
+    pub fn span(&self) -> Option<TimeSpan> {
+        let (first, last) = (self.readings.first()?, self.readings.last()?);
+        Some(TimeSpan::new(first.time, last.time))
+    }
+
     /// Displacement or velocity.
     pub fn quantity(&self) -> Quantity {
         self.unit.quantity()

@@ -3,7 +3,7 @@
 use super::hook::{Alert, MessageState};
 use crate::alert::Level;
 use crate::monitor::EventKind;
-use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
+use crate::reading::{BEFORE_ALL, BenchmarkId, TimeSpan, Timestamp};
 use jiff::SignedDuration;
 use serde_json::json;
 
@@ -20,16 +20,16 @@ pub(super) fn body(
     link: Option<&str>,
 ) -> Result<Vec<u8>, serde_json::Error> {
     let time = alert.event.time;
-    let (starts_at, ends_at) = match alert.state {
-        MessageState::Firing => (time, time.checked_add(STANDS_FOR).unwrap_or(time)),
+    let lasts = match alert.state {
+        MessageState::Firing => TimeSpan::new(time, time.checked_add(STANDS_FOR).unwrap_or(time)),
         MessageState::Resolved | MessageState::Correction => {
             let called = alert.called.or_else(|| since(&alert.key)).unwrap_or(time);
-            (called.min(time), time)
+            TimeSpan::new(called.min(time), time)
         }
     };
     let benchmark = alert.event.benchmark.as_ref();
     let own = (benchmark, alert.level, alert.key.as_str());
-    let mut all = vec![entry(alert, own, (starts_at, ends_at), link)];
+    let mut all = vec![entry(alert, own, lasts, link)];
     let earlier = (alert.earlier.iter()).filter(|one| levels.contains(&one.level));
     let earlier = earlier.map(|one| (one.benchmark.as_ref(), one.level, one.key.as_str()));
     let members = (alert.many.iter().flat_map(|many| &many.members))
@@ -37,7 +37,12 @@ pub(super) fn body(
     let members = members.map(|one| (one.benchmark.as_ref(), alert.level, one.key.as_str()));
     for one in earlier.chain(members) {
         let called = since(one.2).unwrap_or(time);
-        all.push(entry(alert, one, (called.min(time), time), None));
+        all.push(entry(
+            alert,
+            one,
+            TimeSpan::new(called.min(time), time),
+            None,
+        ));
     }
     serde_json::to_vec(&all)
 }
@@ -46,7 +51,7 @@ pub(super) fn body(
 fn entry(
     alert: &Alert,
     (benchmark, level, key): (Option<&BenchmarkId>, Level, &str),
-    (starts_at, ends_at): (Timestamp, Timestamp),
+    lasts: TimeSpan,
     link: Option<&str>,
 ) -> serde_json::Value {
     let (mut rule, mut text) = ("", "");
@@ -75,8 +80,8 @@ fn entry(
             "acknowledge_url": link.unwrap_or_default(),
             "failure_time": alert.failure_time.map(|time| time.to_string()).unwrap_or_default(),
         },
-        "startsAt": starts_at,
-        "endsAt": ends_at,
+        "startsAt": lasts.from,
+        "endsAt": lasts.to,
     })
 }
 

@@ -1,7 +1,7 @@
 //! What was known at a moment: the values taken and the events said until then.
 
 use super::{Store, StoreError, nanoseconds, timestamp};
-use crate::reading::{BenchmarkId, Quantity, Reading, Series, Timestamp, Unit};
+use crate::reading::{BenchmarkId, Quantity, Reading, Series, TimeSpan, Timestamp, Unit};
 use jiff::SignedDuration;
 use rusqlite::{Row, params};
 
@@ -92,10 +92,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn span(
-        &self,
-        benchmark: Option<&str>,
-    ) -> Result<Option<(Timestamp, Timestamp)>, StoreError> {
+    pub fn span(&self, benchmark: Option<&str>) -> Result<Option<TimeSpan>, StoreError> {
         let inner = self.inner();
         let mut query = inner.connection.prepare_cached(
             "SELECT min(first), max(last) FROM (SELECT
@@ -106,7 +103,7 @@ impl Store {
         let (first, last): (Option<i64>, Option<i64>) =
             query.query_row([benchmark], |row| Ok((row.get(0)?, row.get(1)?)))?;
         Ok(match (first, last) {
-            (Some(first), Some(last)) => Some((timestamp(first)?, timestamp(last)?)),
+            (Some(first), Some(last)) => Some(TimeSpan::new(timestamp(first)?, timestamp(last)?)),
             (Some(_) | None, _) => None,
         })
     }
@@ -245,8 +242,9 @@ impl Store {
     /// [`StoreError`].
     pub fn events_within(
         &self,
-        (benchmark, kind): (&str, &str),
-        (from, to): (Timestamp, Timestamp),
+        benchmark: &str,
+        kind: &str,
+        span: TimeSpan,
         each: &mut dyn FnMut(&str),
     ) -> Result<(), StoreError> {
         let inner = self.inner();
@@ -257,8 +255,8 @@ impl Store {
         let mut rows = query.query(params![
             benchmark,
             kind,
-            nanoseconds(from)?,
-            nanoseconds(to)?
+            nanoseconds(span.from)?,
+            nanoseconds(span.to)?
         ])?;
         while let Some(row) = rows.next()? {
             let body = row.get_ref(0)?.as_str();

@@ -48,11 +48,8 @@ fn hours(stretches: &[LevelStretch], level: Level) -> f64 {
 /// One benchmark's row.
 fn row(file: &str, series: &Series, collapse: Option<Timestamp>, evacuation: i64) -> String {
     let crisis = Crisis::play(series, &policy(evacuation));
-    let (first, last) = (
-        series.readings[0].time,
-        series.readings.last().unwrap().time,
-    );
-    let (levels, unknown) = levels_in(&crisis.events, Some(&series.benchmark), (first, last));
+    let span = series.span().unwrap();
+    let (levels, unknown) = levels_in(&crisis.events, Some(&series.benchmark), span);
     let counts = LEVELS.map(|level| called(&crisis.events, level).to_string());
     let lasted = LEVELS.map(|level| {
         let stretches = if level == Level::Unknown {

@@ -1,7 +1,7 @@
 //! A series as a row of marks.
 
 use crate::alert::Level;
-use crate::reading::{Timestamp, days_since, figure};
+use crate::reading::{TimeSpan, Timestamp, days_since, figure};
 
 /// From low to high.
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
@@ -14,21 +14,16 @@ pub(super) struct MarkScale {
 }
 
 impl MarkScale {
-    /// The largest positive value of each part of the time `from` to `to`, on a logarithmic scale; blank where a part
+    /// The largest positive value of each of `count` parts of the time, on a logarithmic scale; blank where a part
     /// has none.
-    pub(super) fn of(
-        points: Vec<(Timestamp, f64)>,
-        from: Timestamp,
-        to: Timestamp,
-        count: usize,
-    ) -> Self {
+    pub(super) fn of(points: Vec<(Timestamp, f64)>, span: TimeSpan, count: usize) -> Self {
         let mut parts: Vec<Option<f64>> = vec![None; count];
         for (time, value) in points {
-            let part = &mut parts[part(time, (from, to), count)];
+            let part = &mut parts[part(time, span, count)];
             *part = Some(part.map_or(value, |other: f64| other.max(value)));
         }
         let known = || parts.iter().flatten().copied();
-        let span = known().reduce(f64::min).zip(known().reduce(f64::max));
+        let ends = known().reduce(f64::min).zip(known().reduce(f64::max));
         let bar = |value: f64, (low, high): (f64, f64)| {
             let height = if high > low {
                 (value / low).ln() / (high / low).ln()
@@ -42,10 +37,10 @@ impl MarkScale {
             step.last().map_or(BARS[0], |(_, bar)| *bar)
         };
         let mark =
-            |part: &Option<f64>| part.zip(span).map_or(' ', |(value, span)| bar(value, span));
+            |part: &Option<f64>| part.zip(ends).map_or(' ', |(value, ends)| bar(value, ends));
         Self {
             marks: parts.iter().map(mark).collect(),
-            span,
+            span: ends,
         }
     }
 
@@ -67,7 +62,7 @@ impl MarkScale {
 /// The highest level of each part of the time, and where a part has no reading the one before.
 pub(super) fn levels(
     points: impl Iterator<Item = (Timestamp, Level)>,
-    span: (Timestamp, Timestamp),
+    span: TimeSpan,
     count: usize,
 ) -> String {
     let mut parts: Vec<Option<Level>> = vec![None; count];
@@ -89,8 +84,8 @@ pub(super) fn levels(
     parts.into_iter().map(letter).collect()
 }
 
-fn part(time: Timestamp, (from, to): (Timestamp, Timestamp), count: usize) -> usize {
-    let share = days_since(from, time) / days_since(from, to);
+fn part(time: Timestamp, span: TimeSpan, count: usize) -> usize {
+    let share = days_since(span.from, time) / days_since(span.from, span.to);
     let place = (0..count).take_while(|place| *place as f64 <= share * (count as f64 - 1.0) + 1e-9);
     place.last().unwrap_or(0)
 }
@@ -106,12 +101,12 @@ mod tests {
     #[test]
     fn marks_rise_with_the_logarithm_and_are_blank_where_nothing_was_measured() {
         let points = vec![(hour(0), 1.0), (hour(1), 10.0), (hour(3), 100.0)];
-        let scale = MarkScale::of(points, hour(0), hour(3), 4);
+        let scale = MarkScale::of(points, TimeSpan::new(hour(0), hour(3)), 4);
         assert_eq!(
             (scale.marks.as_str(), scale.ends().as_str()),
             ("▁▄ █", "1.0-100")
         );
-        let none = MarkScale::of(Vec::new(), hour(0), hour(3), 4);
+        let none = MarkScale::of(Vec::new(), TimeSpan::new(hour(0), hour(3)), 4);
         assert_eq!(
             (none.marks.as_str(), none.ends().as_str()),
             ("    ", "none")
@@ -125,6 +120,9 @@ mod tests {
             (hour(1), Level::Red),
             (hour(3), Level::Orange),
         ];
-        assert_eq!(levels(points.into_iter(), (hour(0), hour(3)), 4), ".rro");
+        assert_eq!(
+            levels(points.into_iter(), TimeSpan::new(hour(0), hour(3)), 4),
+            ".rro"
+        );
     }
 }

@@ -4,7 +4,7 @@ use super::marks::{self, MarkScale};
 use crate::alert::{Level, Policy, hours_in_words, percent_in_words};
 use crate::cli::text::plain;
 use crate::monitor::{AlertState, Event, EventKind, FailureTime, LevelChance};
-use crate::reading::{BenchmarkId, Timestamp, days_since, figure};
+use crate::reading::{BenchmarkId, TimeSpan, Timestamp, days_since, figure};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -222,12 +222,13 @@ impl DemoRecord {
         let (Some(first), Some(last)) = (self.moments.first(), self.moments.last()) else {
             return;
         };
+        let span = TimeSpan::new(first.time, last.time);
         let over = |values: &dyn Fn(&DemoMoment) -> Option<f64>| {
             let points = self
                 .moments
                 .iter()
                 .filter_map(|one| Some((one.time, values(one)?)));
-            MarkScale::of(points.collect(), first.time, last.time, MARKS)
+            MarkScale::of(points.collect(), span, MARKS)
         };
         let velocity = over(&|one| one.velocity_mm_per_day.filter(|v| *v > 0.0));
         let left = over(&|one| {
@@ -236,7 +237,7 @@ impl DemoRecord {
         });
         let levels = marks::levels(
             self.moments.iter().map(|one| (one.time, one.level)),
-            (first.time, last.time),
+            span,
             MARKS,
         );
         let (from, to) = (day(first.time), day(last.time));

@@ -84,7 +84,7 @@ pub(super) fn of_state(args: &Args, file: &Path) -> anyhow::Result<Material> {
     let folder = &config.site.state_dir;
     let store = Store::look(folder)
         .with_context(|| format!("cannot read the state in {}", folder.display()))?;
-    let end = store.span(None)?.map_or(LATEST, |(_, last)| last);
+    let end = store.span(None)?.map_or(LATEST, |span| span.to);
     let since = |spans: i32| {
         let span = args.last.and_then(|span| span.checked_mul(spans));
         let from = span.and_then(|span| end.checked_sub(span).ok());

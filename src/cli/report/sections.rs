@@ -8,7 +8,7 @@ use crate::cli::{explain, score, text};
 use crate::figures::{self, Replayed};
 use crate::monitor::{Event, EventKind, FailureTime, levels_in};
 use crate::plot::escaped;
-use crate::reading::{Series, Timestamp, days_since, figure};
+use crate::reading::{Series, TimeSpan, Timestamp, days_since, figure};
 use jiff::tz::TimeZone;
 use std::fmt::Write as _;
 
@@ -18,8 +18,11 @@ const HOURS: f64 = 24.0;
 
 /// One sentence that says how the benchmark stands at the end.
 pub(super) fn summary(material: &Material, series: &Series) -> String {
-    let (first, last) = span(series);
-    let (levels, unknown) = levels_in(&material.events, Some(&series.benchmark), (first, last));
+    let TimeSpan {
+        from: first,
+        to: last,
+    } = span(series);
+    let (levels, unknown) = levels_in(&material.events, Some(&series.benchmark), span(series));
     let level = levels.last().map_or(Level::Green, |stretch| stretch.level);
     let since = levels.last().map_or(first, |stretch| stretch.from);
     let unknown = unknown.last().filter(|stretch| stretch.is_in_force);
@@ -76,12 +79,8 @@ fn newest_forecast(material: &Material, series: &Series) -> Option<(Option<f64>,
     })
 }
 
-fn span(series: &Series) -> (Timestamp, Timestamp) {
-    let readings = &series.readings;
-    let time = |reading: Option<&crate::reading::Reading>| {
-        reading.map_or(Timestamp::UNIX_EPOCH, |reading| reading.time)
-    };
-    (time(readings.first()), time(readings.last()))
+fn span(series: &Series) -> TimeSpan {
+    series.span().unwrap_or_default()
 }
 
 /// The figures of the replay.

@@ -4,7 +4,7 @@ use super::hours;
 use crate::alert::{Level, Policy};
 use crate::cli::replay;
 use crate::monitor::{Event, Settings, levels_in};
-use crate::reading::{BenchmarkId, Channel, DAYS_PER_YEAR, Recording, Series, Timestamp};
+use crate::reading::{BenchmarkId, Channel, DAYS_PER_YEAR, Recording, Series, TimeSpan, Timestamp};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -56,7 +56,7 @@ fn warning(
     first: Timestamp,
     until: Timestamp,
 ) -> Warning {
-    let (mut stretches, unknown) = levels_in(events, Some(benchmark), (first, until));
+    let (mut stretches, unknown) = levels_in(events, Some(benchmark), TimeSpan::new(first, until));
     stretches.retain(|stretch| stretch.level != Level::Green);
     stretches.extend(unknown);
     let begun = |level| {

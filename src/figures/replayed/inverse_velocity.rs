@@ -104,8 +104,7 @@ impl Replayed<'_> {
     }
 
     fn inverse_panel(&self, x: &Axis, dated: &[Dated]) -> Panel {
-        let (_, last) = self.span().unwrap_or_default();
-        let rates = self.rates(last);
+        let rates = self.rates(self.span().unwrap_or_default().to);
         let forward = rates.iter().filter(|rate| rate.velocity > 0.0);
         let points: Vec<(f64, f64)> = forward
             .map(|rate| (rate.middle(), 1.0 / rate.velocity))

@@ -9,7 +9,7 @@ use crate::figures::day;
 use crate::fit::{Observations, Rate, RateOptions};
 use crate::monitor::{Event, EventKind, FailureTime, LevelChance};
 use crate::plot::{Axis, BLACK, Mark};
-use crate::reading::{Series, Timestamp, after_days};
+use crate::reading::{Series, TimeSpan, Timestamp, after_days};
 
 /// A replayed benchmark.
 #[derive(Debug, Clone, Copy)]
@@ -52,32 +52,31 @@ const SHORT_RECORD_DAYS: f64 = 14.0;
 impl<'a> Replayed<'a> {
     /// Three dates, evenly placed in the last half of the time to the collapse or the record's end.
     pub fn three_dates(&self) -> Vec<Timestamp> {
-        let Some((first, last)) = self.span() else {
+        let Some(TimeSpan { from, to }) = self.span() else {
             return Vec::new();
         };
-        let end = self.collapse.map_or(last, |collapse| collapse.min(last));
-        let half = 0.5 * (day(end) - day(first));
+        let end = self.collapse.map_or(to, |collapse| collapse.min(to));
+        let half = 0.5 * (day(end) - day(from));
         let steps = [1.0, 2.0, 3.0].into_iter();
         let dates = steps.filter_map(|step| after_days(end, half * (step / STEPS - 1.0)));
         dates.collect()
     }
 
     /// The first and the last reading.
-    pub fn span(&self) -> Option<(Timestamp, Timestamp)> {
-        let readings = &self.series.readings;
-        Some((readings.first()?.time, readings.last()?.time))
+    pub fn span(&self) -> Option<TimeSpan> {
+        self.series.span()
     }
 
     /// The last reading or the collapse, whichever is later, in days since 1970.
     fn end(&self) -> f64 {
-        let last = self.span().map(|(_, last)| day(last));
+        let last = self.span().map(|span| day(span.to));
         let collapse = self.collapse.map(day);
         let later = last.into_iter().chain(collapse).reduce(f64::max);
         later.unwrap_or(0.0)
     }
 
     fn start(&self) -> f64 {
-        self.span().map_or(0.0, |(first, _)| day(first))
+        self.span().map_or(0.0, |span| day(span.from))
     }
 
     /// All forecasts, in the order in which they were made.
@@ -155,7 +154,7 @@ impl<'a> Replayed<'a> {
 
     /// A time as short as the others beside it allow.
     fn short(&self, time: Timestamp) -> String {
-        let (_, last) = self.span().unwrap_or((time, time));
+        let last = self.span().map_or(time, |span| span.to);
         let end = self.collapse.unwrap_or(last);
         let pattern = if end.strftime("%Y").to_string() != time.strftime("%Y").to_string() {
             "%Y-%m-%d"

@@ -10,7 +10,7 @@ use crate::monitor::{
     levels_in, recent,
 };
 use crate::reading::{
-    BenchmarkId, Quantity, SECONDS_PER_DAY, Series, Timestamp, days_since, unix_seconds,
+    BenchmarkId, Quantity, SECONDS_PER_DAY, Series, TimeSpan, Timestamp, days_since, unix_seconds,
 };
 use crate::runtime::alarm_state::Alarms;
 use crate::runtime::standing::{TakenOrders, in_force};
@@ -180,19 +180,21 @@ impl SiteReader {
         let now = self.now()?;
         let (at, moment) = (window.at.map(held), window.at.map_or(now, held));
         let known = at.unwrap_or(LATEST);
-        let from = window.from.map_or(EARLIEST, held);
-        let to = window.to.map_or(LATEST, held).min(known);
+        let shown_span = TimeSpan {
+            from: window.from.map_or(EARLIEST, held),
+            to: window.to.map_or(LATEST, held).min(known),
+        };
         let buckets = window.buckets.unwrap_or(BUCKETS).clamp(10, MOST_BUCKETS);
         let all = self.series(name, known)?;
         let is_cut = all.readings.len() >= MOST_SHOWN;
-        let shown = within(&all, from, to);
+        let shown = within(&all, shown_span);
         let latest = self.store.event_at(name, "refit", known)?;
         let latest: Option<Event> = latest.as_deref().map(read).transpose()?;
-        let mut alerts = self.events((name, "alert"), (EARLIEST, known))?;
+        let mut alerts = self.events(name, "alert", TimeSpan::new(EARLIEST, known))?;
         let course = all
             .readings
             .first()
-            .map(|first| levels_in(&alerts, Some(&id), (first.time, moment)));
+            .map(|first| levels_in(&alerts, Some(&id), TimeSpan::new(first.time, moment)));
         let (levels, unknown) = course.unwrap_or_default();
         alerts.reverse();
         alerts.truncate(MOST_EVENTS);
@@ -210,19 +212,19 @@ impl SiteReader {
             standing: self.standing(id, &levels_now, &alarms, at, moment)?,
             at,
             now,
-            first: span.map(|(first, _)| first),
-            last: span.map(|(_, last)| last),
+            first: span.map(|span| span.from),
+            last: span.map(|span| span.to),
             collapse: self.collapse(at, now),
             quantity: all.quantity(),
             is_cut,
             readings: ViewColumns::of(&points(&shown), buckets),
             velocities: velocities(&shown, VELOCITIES),
             line: line(&all, latest.as_ref()),
-            forecasts: self.forecasts(name, (from, to), buckets)?,
+            forecasts: self.forecasts(name, shown_span, buckets)?,
             latest,
             levels,
             unknown,
-            covariates: self.covariates(from, to, known, buckets)?,
+            covariates: self.covariates(shown_span, known, buckets)?,
             marks: self.marks(name, known)?,
             letters: marked()
                 .filter_map(|kind| Some((kind.name, kind.letter?)))
@@ -245,8 +247,7 @@ impl SiteReader {
 
     fn covariates(
         &self,
-        from: Timestamp,
-        to: Timestamp,
+        span: TimeSpan,
         known: Timestamp,
         buckets: usize,
     ) -> Result<Vec<Covariate>, StoreError> {
@@ -255,8 +256,8 @@ impl SiteReader {
             let samples = self.store.values(&Values {
                 name: &name,
                 is_reading: false,
-                from,
-                to,
+                from: span.from,
+                to: span.to,
                 known,
                 most: MOST_SHOWN,
             })?;
@@ -277,12 +278,12 @@ impl SiteReader {
     fn forecasts(
         &self,
         name: &str,
-        span: (Timestamp, Timestamp),
+        span: TimeSpan,
         buckets: usize,
     ) -> Result<Vec<ForecastView>, StoreError> {
         let (mut all, mut failure) = (Vec::new(), None);
         self.store
-            .events_within((name, "refit"), span, &mut |body| match read(body) {
+            .events_within(name, "refit", span, &mut |body| match read(body) {
                 Ok(event) => all.extend(forecast(&event)),
                 Err(error) => failure = Some(error),
             })?;
@@ -292,21 +293,17 @@ impl SiteReader {
     fn marks(&self, name: &str, until: Timestamp) -> Result<Vec<Event>, StoreError> {
         let mut marks = Vec::new();
         for kind in marked() {
-            marks.extend(self.events((name, kind.name), (EARLIEST, until))?);
+            marks.extend(self.events(name, kind.name, TimeSpan::new(EARLIEST, until))?);
         }
         marks.sort_by_key(|event| event.time);
         Ok(marks)
     }
 
     /// The newest events of one kind, oldest first.
-    fn events(
-        &self,
-        which: (&str, &str),
-        span: (Timestamp, Timestamp),
-    ) -> Result<Vec<Event>, StoreError> {
+    fn events(&self, name: &str, kind: &str, span: TimeSpan) -> Result<Vec<Event>, StoreError> {
         let (mut events, mut failure) = (VecDeque::new(), None);
         self.store
-            .events_within(which, span, &mut |body| match read(body) {
+            .events_within(name, kind, span, &mut |body| match read(body) {
                 Ok(event) => {
                     events.push_back(event);
                     if events.len() > 10 * MOST_EVENTS {
@@ -326,10 +323,10 @@ fn points(series: &Series) -> Vec<ThinPoint> {
         .collect()
 }
 
-fn within(series: &Series, from: Timestamp, to: Timestamp) -> Series {
+fn within(series: &Series, span: TimeSpan) -> Series {
     let mut part = series.clone();
     part.readings
-        .retain(|reading| (from..=to).contains(&reading.time));
+        .retain(|reading| (span.from..=span.to).contains(&reading.time));
     part
 }
 
@@ -367,7 +364,7 @@ fn line(series: &Series, latest: Option<&Event>) -> Option<[ThinPoint; 2]> {
         return None;
     };
     let start = series.readings.first()?.time;
-    let until = within(series, start, *t_max);
+    let until = within(series, TimeSpan::new(start, *t_max));
     let zero = days_since(start, inverse_velocity.failure_time?);
     let rates = rates(&until, RateOptions::default());
     let segment = InverseVelocityLine::segment(recent(&rates), zero)?;
