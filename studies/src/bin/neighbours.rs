@@ -69,13 +69,13 @@ fn one_look(seen: &[Seen]) -> Vec<Group> {
 
 /// Errors and widths in ln of the remaining time.
 #[derive(Default)]
-struct Score {
+struct NeighbourScore {
     errors: Vec<f64>,
     widths: Vec<f64>,
     inside: f64,
 }
 
-impl Score {
+impl NeighbourScore {
     fn add(&mut self, passage: &Passage, truth: f64) {
         let at = |share| {
             passage
@@ -96,7 +96,7 @@ impl Score {
 }
 
 fn at_lead(masses: u64, lead: f64) {
-    let (mut joint, mut single) = (Score::default(), Score::default());
+    let (mut joint, mut single) = (NeighbourScore::default(), NeighbourScore::default());
     let mut count = 0;
     for seed in 0..masses {
         let lives = Life::draw_together(MEMBERS, 90_000 + seed);

@@ -1,7 +1,7 @@
 //! The instruments that read simulated slopes: sampling, noise, waves, resolution, gaps, resets and loss.
 
 use super::Family;
-use super::onward::Path;
+use super::onward::WorldPath;
 use crate::random::{happens, log_uniform, normal, uniform};
 use rand::{Rng, RngExt};
 use std::f64::consts::TAU;
@@ -84,7 +84,7 @@ struct Moving {
 }
 
 /// What is drawn once for a record.
-struct Record {
+struct GaugeRecord {
     gaps: Vec<(f64, f64)>,
     resets: Vec<(f64, f64)>,
     phase: f64,
@@ -251,7 +251,7 @@ impl Gauge {
     /// (days, mm or mm/day) of the readings of a path; of one that collapses the sensor is lost early now and then.
     pub(super) fn read(
         &self,
-        path: &Path,
+        path: &WorldPath,
         family: Family,
         generator: &mut impl Rng,
     ) -> Vec<(f64, f64)> {
@@ -297,7 +297,7 @@ impl Gauge {
         readings
     }
 
-    fn record(&self, end: f64, generator: &mut impl Rng) -> Record {
+    fn record(&self, end: f64, generator: &mut impl Rng) -> GaugeRecord {
         let mut gaps = Vec::new();
         while happens(generator, self.gaps) {
             let from = uniform(generator, 0.0, end);
@@ -313,7 +313,7 @@ impl Gauge {
             let sign = if happens(generator, 0.5) { 1.0 } else { -1.0 };
             resets.push((at, sign * size));
         }
-        Record {
+        GaugeRecord {
             gaps,
             resets,
             phase: uniform(generator, 0.0, TAU),
@@ -323,7 +323,13 @@ impl Gauge {
     }
 
     /// The error of one displacement, mm.
-    fn off(&self, record: &Record, moving: &Moving, days: f64, generator: &mut impl Rng) -> f64 {
+    fn off(
+        &self,
+        record: &GaugeRecord,
+        moving: &Moving,
+        days: f64,
+        generator: &mut impl Rng,
+    ) -> f64 {
         let period = if self.kind == GaugeKind::GnssHourly {
             SIDEREAL
         } else {
@@ -347,7 +353,7 @@ impl Gauge {
         error
     }
 
-    fn velocity(&self, path: &Path, days: f64, generator: &mut impl Rng) -> f64 {
+    fn velocity(&self, path: &WorldPath, days: f64, generator: &mut impl Rng) -> f64 {
         let before = (days - self.averaging).max(0.0);
         let error = 0.5 * self.white * normal(generator);
         (path.at(days) - path.at(before) + error) / self.averaging
@@ -362,7 +368,7 @@ impl Gauge {
     }
 }
 
-impl Record {
+impl GaugeRecord {
     /// What resets have added by `days`, mm.
     fn zero(&self, days: f64) -> f64 {
         let done = self.resets.iter().filter(|(at, _)| *at <= days);

@@ -17,12 +17,12 @@ const SEEN: f64 = 10.0;
 
 /// Displacement over time.
 #[derive(Debug)]
-pub(super) struct Path {
+pub(super) struct WorldPath {
     days: Vec<f64>,
     mm: Vec<f64>,
 }
 
-impl Path {
+impl WorldPath {
     pub(super) fn at(&self, days: f64) -> f64 {
         let after = self.days.partition_point(|at| *at <= days);
         let after = after.clamp(1, self.days.len() - 1);
@@ -52,11 +52,11 @@ pub(super) fn path(
     family: Family,
     interval: f64,
     generator: &mut impl Rng,
-) -> Path {
+) -> WorldPath {
     let end = course.end;
     let mut weather = Weather::draw(family, end, generator);
     let longest = (end / STEPS).clamp(FIVE_MINUTES, interval.max(FIVE_MINUTES));
-    let mut path = Path {
+    let mut path = WorldPath {
         days: vec![0.0],
         mm: vec![0.0],
     };

@@ -50,14 +50,14 @@ impl Pulse {
 }
 
 /// How often pulses come, a year, and the bounds of their size, rise and fading.
-struct Kind {
+struct WeatherKind {
     often: f64,
     size: (f64, f64),
     rise: (f64, f64),
     fade: (f64, f64),
 }
 
-impl Kind {
+impl WeatherKind {
     fn pulses(&self, end: f64, generator: &mut impl Rng) -> Vec<Pulse> {
         let (mut at, mut pulses) = (0.0, Vec::new());
         while pulses.len() < MOST_PULSES {
@@ -133,21 +133,21 @@ fn pulses(family: Family, end: f64, generator: &mut impl Rng) -> Vec<Pulse> {
     let kind = if family == Family::Rain {
         let storms = log_uniform(generator, 5.0, 40.0);
         let least = 3.0 * 365.25 / end * uniform(generator, 0.3, 1.5);
-        Kind {
+        WeatherKind {
             often: storms.max(least),
             size: RAIN,
             rise: (0.02, 1.0),
             fade: (0.3, 12.0),
         }
     } else if family == Family::FreezeThaw {
-        Kind {
+        WeatherKind {
             often: 60.0,
             size: (0.5, 10.0),
             rise: (0.05, 0.3),
             fade: (0.2, 1.5),
         }
     } else if happens(generator, 0.25) {
-        Kind {
+        WeatherKind {
             often: log_uniform(generator, 3.0, 20.0),
             size: (0.2, 4.0),
             rise: (0.02, 1.0),

@@ -21,7 +21,7 @@ const FEWEST_READINGS: usize = 80;
 
 /// One slope.
 #[derive(Debug)]
-pub(crate) struct Life {
+pub(crate) struct DrivenLife {
     pub(crate) recording: Recording,
     /// When it fails; `None` where it stands.
     pub(crate) failure: Option<Timestamp>,
@@ -39,14 +39,14 @@ struct Driver {
 }
 
 /// The slope of this seed; the even ones fail.
-pub(crate) fn life(seed: u64) -> Result<Life> {
+pub(crate) fn life(seed: u64) -> Result<DrivenLife> {
     let mut tries = (0..MOST_TRIES).map(|k| attempt(seed.is_multiple_of(2), seed * MOST_TRIES + k));
     tries
         .find_map(Result::transpose)
         .context("no slope could be drawn")?
 }
 
-fn attempt(fails: bool, seed: u64) -> Result<Option<Life>> {
+fn attempt(fails: bool, seed: u64) -> Result<Option<DrivenLife>> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let span = uniform(&mut rng, 150.0, 500.0);
     let driver = if rng.random::<bool>() {
@@ -97,7 +97,7 @@ fn attempt(fails: bool, seed: u64) -> Result<Option<Life>> {
         .into_iter()
         .filter(|(t, _)| *t < end)
         .collect();
-    Ok(Some(Life {
+    Ok(Some(DrivenLife {
         recording: recording(driver.channel, &samples, &read)?,
         failure: failure.and_then(|days| after_days(epoch()?, days)),
         channel: driver.channel,

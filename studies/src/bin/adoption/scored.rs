@@ -36,7 +36,7 @@ pub(crate) struct Comparison {
 }
 
 /// One refit.
-struct Look {
+struct ForecastLook {
     failure_time: FailureTime,
     chance: f64,
     is_adopted: bool,
@@ -45,7 +45,7 @@ struct Look {
 /// A replay: its refits by time, what it adopted, and how often it called orange and red.
 #[derive(Default)]
 struct Replayed {
-    looks: BTreeMap<Timestamp, Look>,
+    looks: BTreeMap<Timestamp, ForecastLook>,
     effects: Vec<String>,
     oranges: usize,
     reds: usize,
@@ -73,7 +73,7 @@ pub(crate) fn compared(recording: &Recording, failure: Option<Timestamp>) -> Res
 }
 
 impl Score {
-    fn add(&mut self, look: &Look, now: Timestamp, failure: Option<Timestamp>) {
+    fn add(&mut self, look: &ForecastLook, now: Timestamp, failure: Option<Timestamp>) {
         let remains = failure.map(|failure| days_since(now, failure));
         self.loss += loss(&look.failure_time, now, remains);
         let comes = remains.is_some_and(|days| days <= OUTLOOK_DAYS);
@@ -142,7 +142,7 @@ impl Replayed {
             ..
         } = &event.kind
         {
-            let look = Look {
+            let look = ForecastLook {
                 failure_time: *failure_time,
                 chance: *chance_within_outlook,
                 is_adopted: plain.is_some(),

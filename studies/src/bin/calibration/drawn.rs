@@ -34,7 +34,7 @@ pub(crate) enum Measured {
 
 /// One series and its truth.
 #[derive(Debug, Clone)]
-pub(crate) struct Drawn {
+pub(crate) struct DrawnSeries {
     pub(crate) observations: Observations,
     pub(crate) measured: Measured,
     /// The law at the last reading.
@@ -62,7 +62,7 @@ const WITHOUT_MEMORY: f64 = 0.4;
 const DRIFTS_BEFORE: [f64; 4] = [0.0, 0.05, 0.15, 0.4];
 
 /// The `index`-th series of a family.
-pub(crate) fn drawn(index: u64, starts: Starts) -> Drawn {
+pub(crate) fn drawn(index: u64, starts: Starts) -> DrawnSeries {
     let mut rng = Pcg64::seed_from_u64(0x5eed_0000 + index);
     loop {
         if let Some(one) = attempt(&mut rng, starts) {
@@ -153,7 +153,7 @@ fn random_process(rng: &mut Pcg64, times: &[f64], spread: f64, memory: f64) -> V
     times.iter().map(step).collect()
 }
 
-fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<Drawn> {
+fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<DrawnSeries> {
     let times = times(rng);
     let count = times.len();
     if count < 15 {
@@ -202,7 +202,7 @@ fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<Drawn> {
         clean.insert(0, (velocity, moved - days * f64::midpoint(velocity, next)));
     }
     let values = measure(rng, (&times, &clean), measured, (scatter, memory));
-    Some(Drawn {
+    Some(DrawnSeries {
         observations: observations(measured, values),
         measured,
         law,

@@ -1,6 +1,6 @@
 //! How often intervals hold the truth, and how often what was said to be probable was so.
 
-use super::drawn::{Drawn, Measured, Starts};
+use super::drawn::{DrawnSeries, Measured, Starts};
 use slipwatch::fit::{Assumptions, LawDraws, LawSample, RateOptions};
 use slipwatch::model::Law;
 use slipwatch::regime::Regime;
@@ -36,7 +36,7 @@ struct Placed {
 
 /// What was said of a thing that is so or is not.
 #[derive(Debug, Clone, Copy)]
-struct Said {
+struct StatedChance {
     what: &'static str,
     probability: f64,
     so: bool,
@@ -46,7 +46,7 @@ struct Said {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tally {
     placed: Vec<Placed>,
-    said: Vec<Said>,
+    said: Vec<StatedChance>,
     series: u32,
     without: u32,
     evaluations: usize,
@@ -71,7 +71,7 @@ fn central(share: f64) -> bool {
 
 impl Tally {
     /// Fits one series and notes what was said of it.
-    pub(crate) fn add(&mut self, drawn: &Drawn, starts: Starts) {
+    pub(crate) fn add(&mut self, drawn: &DrawnSeries, starts: Starts) {
         self.series += 1;
         let all = 0..drawn.observations.values.len();
         let rates = drawn.observations.rates(all, RateOptions::default());
@@ -93,7 +93,7 @@ impl Tally {
         }
     }
 
-    fn regimes(&mut self, drawn: &Drawn, samples: &[LawSample]) {
+    fn regimes(&mut self, drawn: &DrawnSeries, samples: &[LawSample]) {
         let truth = drawn.law.regime();
         for regime in Regime::KNOWN {
             let probability = weight(samples, |law| law.regime() == regime);
@@ -105,7 +105,7 @@ impl Tally {
         self.say("accelerating", accelerating, drawn.law.r > 0.0);
     }
 
-    fn intervals(&mut self, drawn: &Drawn, samples: &[LawSample]) {
+    fn intervals(&mut self, drawn: &DrawnSeries, samples: &[LawSample]) {
         let of: [(&'static str, Read); 4] = [
             ("m", |law| law.p),
             ("r", |law| law.r),
@@ -141,7 +141,7 @@ impl Tally {
     }
 
     fn say(&mut self, what: &'static str, probability: f64, so: bool) {
-        self.said.push(Said {
+        self.said.push(StatedChance {
             what,
             probability,
             so,
@@ -168,9 +168,10 @@ impl Tally {
         let bin = |index: u32| {
             let low = f64::from(index) / f64::from(BINS);
             let high = low + 1.0 / f64::from(BINS) + f64::from(index / (BINS - 1));
-            let within =
-                |one: &&Said| one.what == what && one.probability >= low && one.probability < high;
-            let met: Vec<&Said> = self.said.iter().filter(within).collect();
+            let within = |one: &&StatedChance| {
+                one.what == what && one.probability >= low && one.probability < high
+            };
+            let met: Vec<&StatedChance> = self.said.iter().filter(within).collect();
             let count = met.len().max(1) as f64;
             let mean = met.iter().map(|one| one.probability).sum::<f64>() / count;
             let so = met.iter().filter(|one| one.so).count() as f64 / count;

@@ -6,9 +6,9 @@
 //! an rms of `SHOWS` times the noise (log-uniform, for the weakest effect), and draws in which this noise is no
 //! noise of an instrument are dropped. Effects of the reading have their sizes in multiples of the noise.
 
-use super::family::{Family, Range, Recipe};
-use super::instrument::Instrument;
-use super::read::{self, Slope};
+use super::family::{Range, Recipe, SceneFamily};
+use super::instrument::SceneInstrument;
+use super::read::{self, SceneSlope};
 use super::scene::{Place, Planned, Scene};
 use super::slope::{Path, SlopeEffect, path};
 use super::truth::{TrueLaw, TrueNoise, Truth};
@@ -51,7 +51,7 @@ const REMEMBERS: f64 = 0.12;
 const MOST_DRAWS: u32 = 20_000;
 
 /// The `index`-th series of a family; `None` if no draw meets the conditions.
-pub(crate) fn drawn(family: Family, range: Range, index: u64) -> Option<Drawn> {
+pub(crate) fn drawn(family: SceneFamily, range: Range, index: u64) -> Option<Drawn> {
     let seed = family.seed(range, index);
     let mut rng = Pcg64::seed_from_u64(seed);
     // Before the draws, or what is easily shown would crowd out what is not.
@@ -95,13 +95,13 @@ fn plan(rng: &mut Pcg64, scene: &Scene, kinds: &[Kind]) -> Option<Plan> {
         }
     }
     let window = effects.iter().find_map(|one| match one.place {
-        Place::Instrument(Instrument::IntervalMean { window }) => Some(window),
+        Place::Instrument(SceneInstrument::IntervalMean { window }) => Some(window),
         Place::Instrument(_) | Place::SlopeEffect(_) => None,
     });
     Some(Plan { effects, window })
 }
 
-fn attempt(rng: &mut Pcg64, family: Family, recipe: &Recipe) -> Option<Drawn> {
+fn attempt(rng: &mut Pcg64, family: SceneFamily, recipe: &Recipe) -> Option<Drawn> {
     let mut scene = Scene::draw(rng, recipe)?;
     let mut plan = plan(rng, &scene, &recipe.kinds)?;
     let days = scene.schedule.days.clone();
@@ -115,7 +115,7 @@ fn attempt(rng: &mut Pcg64, family: Family, recipe: &Recipe) -> Option<Drawn> {
     if let Some(window) = plan.window {
         scene.schedule.days.retain(|day| *day >= window);
     }
-    let slope = Slope {
+    let slope = SceneSlope {
         scene: &scene,
         seen: &seen,
         days: &days,
@@ -129,7 +129,7 @@ fn attempt(rng: &mut Pcg64, family: Family, recipe: &Recipe) -> Option<Drawn> {
     };
     let remembers =
         happens(rng, REMEMBERS) && !plan.has(Kind::CORRELATED_NOISE) && !plan.effects.is_empty();
-    let background = remembers.then(|| Instrument::Remembering {
+    let background = remembers.then(|| SceneInstrument::Remembering {
         memory: uniform(rng, 2.0, 5.0) * scene.schedule.interval,
         noises: uniform(rng, 0.7, 1.2),
     });
@@ -203,7 +203,7 @@ fn noise(
                 let alone = path(&scene.law, std::slice::from_ref(ground), days)?;
                 left_by_the_plain_law(scene, days, &alone)?
             }
-            Place::Instrument(Instrument::IntervalMean { .. }) => {
+            Place::Instrument(SceneInstrument::IntervalMean { .. }) => {
                 let blurred = whole.velocity.iter().zip(&seen.velocity);
                 let change: Vec<f64> = blurred
                     .map(|(at_once, mean)| mean / at_once - 1.0)
@@ -228,7 +228,7 @@ fn noise(
         log_uniform_by_exp(rng, most / 50.0, most)
     };
     for one in &mut plan.effects {
-        if !matches!(&one.place, Place::Instrument(one) if !matches!(one, Instrument::IntervalMean { .. }))
+        if !matches!(&one.place, Place::Instrument(one) if !matches!(one, SceneInstrument::IntervalMean { .. }))
         {
             one.truth.rms_over_noise /= noise;
         }
@@ -238,7 +238,7 @@ fn noise(
 
 /// Whether the plain law leaves as much of the readings without noise as the weakest effect must show, fitted by the second of the
 /// program's searches too: where the first ends in a poor law, an effect seems to show that the better law accounts for.
-fn shows(slope: &Slope, series: &Series, prediction: &[f64]) -> bool {
+fn shows(slope: &SceneSlope, series: &Series, prediction: &[f64]) -> bool {
     let mut noiseless = series.clone();
     for (reading, value) in noiseless.readings.iter_mut().zip(prediction) {
         reading.value = *value;
@@ -263,7 +263,7 @@ fn size(rng: &mut Pcg64, scene: &Scene, whole: &Path, noise: f64) -> Option<f64>
 }
 
 fn channels(scene: &Scene) -> Option<Vec<Channel>> {
-    let channel = |weather: &super::weather::Weather| {
+    let channel = |weather: &super::weather::SceneWeather| {
         let samples = weather.recorded().map(|(day, value)| {
             let time = scene.time(day)?;
             Some(Sample { time, value })
@@ -281,10 +281,10 @@ fn channels(scene: &Scene) -> Option<Vec<Channel>> {
 }
 
 fn truth(
-    family: Family,
+    family: SceneFamily,
     scene: &Scene,
     plan: Plan,
-    (slope, background): (&Slope, Option<&Instrument>),
+    (slope, background): (&SceneSlope, Option<&SceneInstrument>),
 ) -> Truth {
     let mut noise = TrueNoise {
         white: slope.noise,
@@ -298,24 +298,24 @@ fn truth(
     });
     for one in instruments.chain(background) {
         match one {
-            Instrument::Remembering { memory, noises } => {
+            SceneInstrument::Remembering { memory, noises } => {
                 noise.correlated = noises * slope.noise;
                 noise.memory_days = Some(*memory);
             }
-            Instrument::RandomWalk { noises, .. } => noise.correlated = noises * slope.noise,
-            Instrument::Offset { .. }
-            | Instrument::Thermal { .. }
-            | Instrument::Yearly { .. }
-            | Instrument::IntervalMean { .. } => {}
+            SceneInstrument::RandomWalk { noises, .. } => noise.correlated = noises * slope.noise,
+            SceneInstrument::Offset { .. }
+            | SceneInstrument::Thermal { .. }
+            | SceneInstrument::Yearly { .. }
+            | SceneInstrument::IntervalMean { .. } => {}
         }
     }
     let effects = plan.effects.into_iter().map(|one| {
         let mut truth = one.truth;
         match one.place {
             Place::Instrument(
-                Instrument::Offset { noises, .. }
-                | Instrument::Thermal { noises, .. }
-                | Instrument::Yearly { noises, .. },
+                SceneInstrument::Offset { noises, .. }
+                | SceneInstrument::Thermal { noises, .. }
+                | SceneInstrument::Yearly { noises, .. },
             ) => {
                 let gain = noises * slope.noise;
                 truth.gain_per_sd = (truth.effect == Kind::THERMAL).then_some(gain);

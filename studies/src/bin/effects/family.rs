@@ -8,7 +8,7 @@ use studies::random::{happens, one_of};
 
 /// What a family's series have in them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Family {
+pub(crate) enum SceneFamily {
     /// One effect of this kind; with `Kind::NONE` white noise alone.
     Of(Kind),
     /// Two kinds at once.
@@ -48,7 +48,7 @@ pub(crate) struct Recipe {
     pub(crate) characters: &'static [(f64, Character)],
 }
 
-impl Family {
+impl SceneFamily {
     pub(crate) const ALL: [Self; 17] = [
         Self::Of(Kind::HYDROLOGICAL),
         Self::Of(Kind::SEASONAL),

@@ -5,7 +5,7 @@ use super::laws;
 use super::scene::{Place, Planned, Scene};
 use super::slope::{SlopeEffect, path};
 use super::truth::TrueEffect;
-use super::weather::{Covariate, Response, Weather, YEAR, moments};
+use super::weather::{Covariate, Response, SceneWeather, YEAR, moments};
 use rand_pcg::Pcg64;
 use slipwatch::effects::{Form, Kind};
 use slipwatch::model::Load;
@@ -43,7 +43,7 @@ fn hydrological(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
 }
 
 /// The load that a covariate's response brings.
-fn driven(rng: &mut Pcg64, scene: &Scene, weather: &Weather) -> Option<Planned> {
+fn driven(rng: &mut Pcg64, scene: &Scene, weather: &SceneWeather) -> Option<Planned> {
     let response = Response {
         mean_delay: scene.mean_delay(rng, weather.step),
         shape: one_of(rng, &[(0.6, 1), (0.2, 2), (0.2, 3)]),
@@ -247,7 +247,7 @@ fn outside(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
         _ => {
             // A reservoir's year could be distinguished from none of the table's.
             let covariate = one_of(rng, &Covariate::WATER_WITHOUT_A_YEAR);
-            let hidden = Weather::draw(rng, covariate, length);
+            let hidden = SceneWeather::draw(rng, covariate, length);
             let planned = driven(rng, scene, &hidden)?;
             truth = planned.truth;
             truth.effect = Kind::UNEXPLAINED;

@@ -10,7 +10,7 @@ use studies::random::{count, happens, log_uniform_by_exp, normal, sign, uniform}
 
 /// One effect of the reading; sizes are in standard deviations of the white noise.
 #[derive(Debug, Clone)]
-pub(crate) enum Instrument {
+pub(crate) enum SceneInstrument {
     /// The reading jumps by so much.
     Offset { day: f64, noises: f64 },
     /// One value a reading, of unit variance, times so much.
@@ -59,7 +59,7 @@ fn offsets(rng: &mut Pcg64, scene: &Scene) -> Option<Vec<Planned>> {
         truth.unit = Some("mm".to_owned());
         truth.rms_over_noise = noises.abs() * (before * (1.0 - before)).sqrt();
         planned.push(Planned::instrument(
-            Instrument::Offset { day, noises },
+            SceneInstrument::Offset { day, noises },
             truth,
         ));
     }
@@ -100,7 +100,7 @@ fn thermal(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
     truth.rms_over_noise = noises.abs();
     let shape = felt.iter().map(|value| (value - mean) / spread).collect();
     Some(Planned::instrument(
-        Instrument::Thermal { shape, noises },
+        SceneInstrument::Thermal { shape, noises },
         truth,
     ))
 }
@@ -112,7 +112,7 @@ fn yearly(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
     truth.unit = Some("mm".to_owned());
     truth.rms_over_noise = noises * std::f64::consts::FRAC_1_SQRT_2;
     let day = uniform(rng, 0.0, YEAR);
-    let planned = Planned::instrument(Instrument::Yearly { day, noises }, truth);
+    let planned = Planned::instrument(SceneInstrument::Yearly { day, noises }, truth);
     (scene.length() > 2.5 * YEAR).then_some(planned)
 }
 
@@ -121,7 +121,7 @@ fn interval_mean(rng: &mut Pcg64, scene: &Scene) -> Planned {
     let mut truth = TrueEffect::of(Kind::INTERVAL_MEAN);
     truth.size = Some(window);
     truth.unit = Some("day".to_owned());
-    Planned::instrument(Instrument::IntervalMean { window }, truth)
+    Planned::instrument(SceneInstrument::IntervalMean { window }, truth)
 }
 
 fn noise(rng: &mut Pcg64, scene: &Scene) -> Planned {
@@ -131,7 +131,7 @@ fn noise(rng: &mut Pcg64, scene: &Scene) -> Planned {
         let noises = log_uniform_by_exp(rng, 0.3, 1.0);
         "random walk".clone_into(&mut truth.what);
         truth.rms_over_noise = noises * (scene.length() / interval / 6.0).sqrt();
-        return Planned::instrument(Instrument::RandomWalk { interval, noises }, truth);
+        return Planned::instrument(SceneInstrument::RandomWalk { interval, noises }, truth);
     }
     let most = (scene.length() / interval / 12.0).clamp(6.0, 50.0);
     let memory = log_uniform_by_exp(rng, 5.0, most) * interval;
@@ -139,10 +139,10 @@ fn noise(rng: &mut Pcg64, scene: &Scene) -> Planned {
     "AR(1)".clone_into(&mut truth.what);
     truth.lag_days = Some(memory);
     truth.rms_over_noise = noises;
-    Planned::instrument(Instrument::Remembering { memory, noises }, truth)
+    Planned::instrument(SceneInstrument::Remembering { memory, noises }, truth)
 }
 
-impl Instrument {
+impl SceneInstrument {
     /// What it adds to each reading, in standard deviations of the white noise; `None` for a mean over an
     /// interval, which adds nothing.
     pub(crate) fn adds(&self, rng: &mut Pcg64, days: &[f64]) -> Option<Vec<f64>> {

@@ -25,7 +25,7 @@ mod weather;
 use anyhow::{Context, Result};
 use clap::Parser;
 use drawn::{Drawn, drawn};
-use family::{Family, Range};
+use family::{Range, SceneFamily};
 use score::Outcome;
 use slipwatch::effects;
 use slipwatch::reading::Series;
@@ -87,7 +87,7 @@ fn main() -> Result<()> {
 }
 
 /// Explains one series and says in a line how that went; where `refused`, also what it refused.
-fn explained(family: Family, name: &str, drawn: &Drawn, refused: bool) -> Outcome {
+fn explained(family: SceneFamily, name: &str, drawn: &Drawn, refused: bool) -> Outcome {
     let neighbours: Vec<&Series> = drawn.neighbours.iter().collect();
     let watch = Stopwatch::start();
     let explanation = effects::explain(
@@ -161,13 +161,13 @@ fn given_the_truth(drawn: &Drawn) -> Option<f64> {
     error.fit.after
 }
 
-fn families(names: &[String]) -> Result<Vec<Family>> {
+fn families(names: &[String]) -> Result<Vec<SceneFamily>> {
     if names.is_empty() {
-        return Ok(Family::ALL.to_vec());
+        return Ok(SceneFamily::ALL.to_vec());
     }
     let named = |name: &String| {
-        let known = Family::ALL.map(Family::name).join(", ");
-        Family::named(name).with_context(|| format!("{name:?}: expected one of {known}"))
+        let known = SceneFamily::ALL.map(SceneFamily::name).join(", ");
+        SceneFamily::named(name).with_context(|| format!("{name:?}: expected one of {known}"))
     };
     names.iter().map(named).collect()
 }
@@ -175,8 +175,8 @@ fn families(names: &[String]) -> Result<Vec<Family>> {
 /// Draws every series asked for and gives it to `task`; the results in the order of families and seeds.
 fn each<T: Send>(
     arguments: &Arguments,
-    families: &[Family],
-    task: impl Fn(Family, &str, &Drawn) -> T + Sync,
+    families: &[SceneFamily],
+    task: impl Fn(SceneFamily, &str, &Drawn) -> T + Sync,
 ) -> Result<Vec<T>> {
     let total = arguments.n * families.len() as u64;
     let next = AtomicU64::new(0);

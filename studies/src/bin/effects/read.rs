@@ -1,6 +1,6 @@
 //! The reading of a slope: its benchmark and the benchmarks beside it, with noise and instruments' effects.
 
-use super::instrument::Instrument;
+use super::instrument::SceneInstrument;
 use super::scene::Scene;
 use super::slope::{Path, SlopeEffect, path};
 use rand_pcg::Pcg64;
@@ -9,7 +9,7 @@ use studies::random::{count, happens, log_uniform_by_exp, normal, one_of};
 
 /// A path with its size and noise.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Slope<'a> {
+pub(crate) struct SceneSlope<'a> {
     /// Its schedule is that of what is read.
     pub(crate) scene: &'a Scene,
     /// At each of `days`.
@@ -51,12 +51,12 @@ pub(crate) fn means(scene: &Scene, effects: &[SlopeEffect], window: f64) -> Opti
     Some(seen)
 }
 
-impl Slope<'_> {
+impl SceneSlope<'_> {
     /// The benchmark's readings, and what they would be without noise.
     pub(crate) fn read<'b>(
         &self,
         rng: &mut Pcg64,
-        instruments: impl Iterator<Item = &'b Instrument>,
+        instruments: impl Iterator<Item = &'b SceneInstrument>,
     ) -> Option<(Series, Vec<f64>)> {
         let days = &self.scene.schedule.days;
         let mut noiseless = self.values(self.seen);
@@ -141,7 +141,7 @@ pub(crate) type Groups = Vec<Vec<String>>;
 /// law alone and without what moves the others. The groups then, the explained benchmark's own first.
 pub(crate) fn neighbours(
     rng: &mut Pcg64,
-    slope: &Slope,
+    slope: &SceneSlope,
     is_parted: bool,
 ) -> Option<(Vec<Series>, Option<Groups>)> {
     let wanted = if is_parted {

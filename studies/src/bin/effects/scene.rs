@@ -1,12 +1,12 @@
 //! One slope before it is read: its law, the times, the weather, and the effects planned for it.
 
 use super::family::Recipe;
-use super::instrument::Instrument;
+use super::instrument::SceneInstrument;
 use super::laws;
 use super::schedule::Schedule;
 use super::slope::SlopeEffect;
 use super::truth::TrueEffect;
-use super::weather::{Covariate, Weather};
+use super::weather::{Covariate, SceneWeather};
 use rand_pcg::Pcg64;
 use slipwatch::effects::Kind;
 use slipwatch::model::Law;
@@ -19,7 +19,7 @@ pub(crate) struct Scene {
     pub(crate) schedule: Schedule,
     pub(crate) quantity: Quantity,
     pub(crate) law: Law,
-    pub(crate) weather: Vec<Weather>,
+    pub(crate) weather: Vec<SceneWeather>,
     pub(crate) first: Timestamp,
 }
 
@@ -27,7 +27,7 @@ pub(crate) struct Scene {
 #[derive(Debug, Clone)]
 pub(crate) enum Place {
     SlopeEffect(SlopeEffect),
-    Instrument(Instrument),
+    Instrument(SceneInstrument),
 }
 
 /// An effect and what is to be said of it.
@@ -43,7 +43,7 @@ impl Planned {
         Self { place, truth }
     }
 
-    pub(crate) fn instrument(instrument: Instrument, truth: TrueEffect) -> Self {
+    pub(crate) fn instrument(instrument: SceneInstrument, truth: TrueEffect) -> Self {
         let place = Place::Instrument(instrument);
         Self { place, truth }
     }
@@ -62,7 +62,7 @@ impl Scene {
         let covariates = covariates(rng, &recipe.kinds);
         let weather = covariates
             .into_iter()
-            .map(|covariate| Weather::draw(rng, covariate, length))
+            .map(|covariate| SceneWeather::draw(rng, covariate, length))
             .collect();
         let beginning = Timestamp::from_second(1_325_376_000).ok()?;
         Some(Self {

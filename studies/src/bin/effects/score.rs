@@ -1,7 +1,7 @@
 //! One explanation beside the truth: what was named rightly, and by how much its figures are off.
 
 use super::drawn::Drawn;
-use super::family::Family;
+use super::family::SceneFamily;
 use super::truth::{TrueEffect, Truth};
 use slipwatch::effects::{Cause, Effect, Explained, Explanation, Kind, Options, error_given};
 use slipwatch::reading::{Timestamp, days_since};
@@ -21,7 +21,7 @@ pub(crate) enum Grade {
 /// How one series went.
 #[derive(Debug, Clone)]
 pub(crate) struct Outcome {
-    pub(crate) family: Family,
+    pub(crate) family: SceneFamily,
     pub(crate) name: String,
     /// The first effect named, or `none` or `unexplained`.
     pub(crate) called: Kind,
@@ -41,7 +41,7 @@ pub(crate) struct Outcome {
 
 impl Outcome {
     pub(crate) fn of(
-        family: Family,
+        family: SceneFamily,
         name: &str,
         (drawn, explanation): (&Drawn, &Explanation),
         seconds: f64,
@@ -121,12 +121,17 @@ fn there(truth: &Truth) -> BTreeSet<Kind> {
     kinds.filter(|kind| *kind != Kind::UNEXPLAINED).collect()
 }
 
-fn is_right(family: Family, called: Kind, said: &BTreeSet<Kind>, there: &BTreeSet<Kind>) -> bool {
+fn is_right(
+    family: SceneFamily,
+    called: Kind,
+    said: &BTreeSet<Kind>,
+    there: &BTreeSet<Kind>,
+) -> bool {
     match family {
-        Family::Of(kind) if kind == Kind::NONE => said.is_empty() && called == Kind::NONE,
-        Family::Outside => said.is_empty() && called == Kind::UNEXPLAINED,
-        Family::Mixed => there.contains(&called),
-        Family::Of(kind) => there.contains(&called) && said.contains(&kind),
+        SceneFamily::Of(kind) if kind == Kind::NONE => said.is_empty() && called == Kind::NONE,
+        SceneFamily::Outside => said.is_empty() && called == Kind::UNEXPLAINED,
+        SceneFamily::Mixed => there.contains(&called),
+        SceneFamily::Of(kind) => there.contains(&called) && said.contains(&kind),
     }
 }
 

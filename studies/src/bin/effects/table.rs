@@ -1,6 +1,6 @@
 //! docs/effects-table.md: how the families went.
 
-use super::family::{Family, Range};
+use super::family::{Range, SceneFamily};
 use super::score::{Grade, Outcome};
 use slipwatch::effects::Kind;
 use std::collections::BTreeMap;
@@ -58,8 +58,8 @@ fn most_of_a_family(outcomes: &[Outcome]) -> usize {
         .unwrap_or(0)
 }
 
-fn by_family(outcomes: &[Outcome]) -> BTreeMap<Family, Vec<&Outcome>> {
-    let mut families: BTreeMap<Family, Vec<&Outcome>> = BTreeMap::new();
+fn by_family(outcomes: &[Outcome]) -> BTreeMap<SceneFamily, Vec<&Outcome>> {
+    let mut families: BTreeMap<SceneFamily, Vec<&Outcome>> = BTreeMap::new();
     for outcome in outcomes {
         families.entry(outcome.family).or_default().push(outcome);
     }
@@ -74,7 +74,7 @@ fn table(outcomes: &[Outcome]) -> String {
     }
     let labelled: Vec<&Outcome> = families
         .iter()
-        .filter(|(family, _)| matches!(family, Family::Of(kind) if *kind != Kind::NONE))
+        .filter(|(family, _)| matches!(family, SceneFamily::Of(kind) if *kind != Kind::NONE))
         .flat_map(|(_, of)| of.iter().copied())
         .collect();
     text.push_str(&row("every single kind", &labelled));
@@ -114,7 +114,7 @@ fn row(name: &str, of: &[&Outcome]) -> String {
 
 /// Effects named where there is none.
 fn false_discoveries(outcomes: &[Outcome]) -> String {
-    let nothing = Family::Of(Kind::NONE);
+    let nothing = SceneFamily::Of(Kind::NONE);
     let of: Vec<_> = outcomes
         .iter()
         .filter(|one| one.family == nothing)

@@ -1,7 +1,7 @@
 //! The synthetic slopes that `explain` is judged on hold what they are said to hold.
 
 use crate::drawn::{Drawn, drawn};
-use crate::family::{Family, Range};
+use crate::family::{Range, SceneFamily};
 use crate::score::{Grade, Outcome};
 use crate::slope::{SlopeEffect, path};
 use slipwatch::effects::{Effect, Explanation, Kind, Options, explain};
@@ -115,8 +115,8 @@ fn after_a_change_of_friction_the_new_law_runs_from_the_velocity_reached() {
     }
 }
 
-fn each_family(range: Range, mut see: impl FnMut(Family, &Drawn)) {
-    for family in Family::ALL {
+fn each_family(range: Range, mut see: impl FnMut(SceneFamily, &Drawn)) {
+    for family in SceneFamily::ALL {
         for index in 0..6 {
             see(family, &drawn(family, range, index).unwrap());
         }
@@ -142,7 +142,7 @@ fn every_effect_of_the_motion_shows_over_the_noise() {
             assert!(shows >= least, "{family:?}: {shows} of {effect:?}");
         }
         let is_empty = one.truth.effects.is_empty();
-        assert_eq!(is_empty, family == Family::Of(Kind::NONE));
+        assert_eq!(is_empty, family == SceneFamily::Of(Kind::NONE));
     });
 }
 
@@ -173,7 +173,7 @@ fn readings_scatter_about_the_true_prediction_as_the_truth_says() {
 
 #[test]
 fn a_seed_gives_one_series_and_what_is_judged_is_not_what_is_developed_on() {
-    let family = Family::Of(Kind::HYDROLOGICAL);
+    let family = SceneFamily::Of(Kind::HYDROLOGICAL);
     let dev = drawn(family, Range::Dev, 3).unwrap();
     assert_eq!(dev.series, drawn(family, Range::Dev, 3).unwrap().series);
     assert_ne!(dev.series, drawn(family, Range::Judged, 3).unwrap().series);
@@ -182,7 +182,7 @@ fn a_seed_gives_one_series_and_what_is_judged_is_not_what_is_developed_on() {
 #[test]
 fn what_is_dumped_reads_back_as_what_was_drawn() {
     let folder = tempfile::tempdir().unwrap();
-    let one = drawn(Family::Of(Kind::PARTITION), Range::Dev, 0).unwrap();
+    let one = drawn(SceneFamily::Of(Kind::PARTITION), Range::Dev, 0).unwrap();
     crate::dump::write(folder.path(), "one", &one).unwrap();
     let file = folder.path().join("one.csv");
     let (recording, _) = read_files(&[file], &ReadOptions::default()).unwrap();
@@ -200,7 +200,7 @@ fn what_is_dumped_reads_back_as_what_was_drawn() {
 #[test]
 fn a_step_seen_through_a_mean_is_named_with_the_mean_and_a_step_read_at_once_without_it() {
     let named = |kind: Kind, index: u64| -> Vec<Kind> {
-        let one = drawn(Family::Of(kind), Range::Dev, index).unwrap();
+        let one = drawn(SceneFamily::Of(kind), Range::Dev, index).unwrap();
         let options = Options::default();
         let said = explain(&one.series, &one.channels, &[], &options, &mut |_| {});
         let all = std::iter::once(&said.verdict).chain(&said.also);
@@ -225,12 +225,12 @@ fn saying(one: &Drawn, named: Vec<Effect>) -> Explanation {
     said
 }
 
-fn score(family: Family, one: &Drawn, said: &Explanation) -> Outcome {
+fn score(family: SceneFamily, one: &Drawn, said: &Explanation) -> Outcome {
     Outcome::of(family, "one", (one, said), 0.0)
 }
 
 /// A series of that family beside whose noise stands none that remembers.
-fn plain(family: Family) -> Drawn {
+fn plain(family: SceneFamily) -> Drawn {
     (0..20)
         .filter_map(|index| drawn(family, Range::Dev, index))
         .find(|one| !one.truth.background_noise_remembers)
@@ -239,7 +239,7 @@ fn plain(family: Family) -> Drawn {
 
 #[test]
 fn the_right_kind_through_the_wrong_channel_is_half_right() {
-    let family = Family::Of(Kind::HYDROLOGICAL);
+    let family = SceneFamily::Of(Kind::HYDROLOGICAL);
     let one = plain(family);
     let mut effect = Effect::of(Kind::HYDROLOGICAL);
     effect.channel.clone_from(&one.truth.effects[0].channel);
@@ -254,7 +254,7 @@ fn the_right_kind_through_the_wrong_channel_is_half_right() {
 
 #[test]
 fn a_wrong_kind_is_left_open_where_the_right_one_could_not_be_separated() {
-    let family = Family::Of(Kind::LOAD_STEP);
+    let family = SceneFamily::Of(Kind::LOAD_STEP);
     let one = plain(family);
     let mut said = saying(&one, vec![Effect::of(Kind::STATE_RESET)]);
     let closed = score(family, &one, &said);
@@ -267,7 +267,7 @@ fn a_wrong_kind_is_left_open_where_the_right_one_could_not_be_separated() {
 
 #[test]
 fn an_effect_named_too_many_is_not_exactly_right() {
-    let family = Family::Of(Kind::LOAD_STEP);
+    let family = SceneFamily::Of(Kind::LOAD_STEP);
     let one = plain(family);
     let mut step = Effect::of(Kind::LOAD_STEP);
     step.at = one.truth.effects[0].at;
@@ -279,7 +279,7 @@ fn an_effect_named_too_many_is_not_exactly_right() {
 
 #[test]
 fn nothing_is_the_right_answer_to_noise_and_unexplained_to_what_no_label_fits() {
-    let (none, outside) = (Family::Of(Kind::NONE), Family::Outside);
+    let (none, outside) = (SceneFamily::Of(Kind::NONE), SceneFamily::Outside);
     let (noise, unknown) = (plain(none), plain(outside));
     let nothing = |one| saying(one, Vec::new());
     let open = |one| saying(one, vec![Effect::of(Kind::UNEXPLAINED)]);
@@ -292,7 +292,7 @@ fn nothing_is_the_right_answer_to_noise_and_unexplained_to_what_no_label_fits() 
 }
 
 /// What `explain` calls the `index`-th slope for development, and whether that is right.
-fn called(family: Family, index: u64) -> Outcome {
+fn called(family: SceneFamily, index: u64) -> Outcome {
     let one = drawn(family, Range::Dev, index).unwrap();
     let neighbours: Vec<_> = one.neighbours.iter().collect();
     let options = Options::default();
@@ -309,14 +309,14 @@ fn called(family: Family, index: u64) -> Outcome {
 /// A load step of two per cent explains the same readings, by the pace that it changes and not by its jump.
 #[test]
 fn a_changed_pace_without_a_jump_is_a_change_of_friction() {
-    let friction = called(Family::Of(Kind::FRICTION_CHANGE), 3);
+    let friction = called(SceneFamily::Of(Kind::FRICTION_CHANGE), 3);
     assert_eq!(friction.called, Kind::FRICTION_CHANGE);
     assert!(friction.at_errors[0] < 20.0, "{:?}", friction.at_errors);
 }
 
 #[test]
 fn a_group_that_relaxes_after_it_parted_is_a_partition() {
-    let parted = called(Family::Of(Kind::PARTITION), 2);
+    let parted = called(SceneFamily::Of(Kind::PARTITION), 2);
     assert_eq!(parted.called, Kind::PARTITION);
     assert!(parted.at_errors[0] < 20.0, "{:?}", parted.at_errors);
 }
@@ -324,6 +324,6 @@ fn a_group_that_relaxes_after_it_parted_is_a_partition() {
 /// A change of friction would be accepted, and leaves three times the noise.
 #[test]
 fn a_pulse_of_the_load_that_no_label_accounts_for_is_unexplained() {
-    let outside = called(Family::Outside, 0);
+    let outside = called(SceneFamily::Outside, 0);
     assert!(outside.right_kind(), "{:?}", outside.said);
 }

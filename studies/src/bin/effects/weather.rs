@@ -64,7 +64,7 @@ impl Covariate {
 
 /// A covariate on an even grid.
 #[derive(Debug, Clone)]
-pub(crate) struct Weather {
+pub(crate) struct SceneWeather {
     pub(crate) covariate: Covariate,
     /// Days of the first value, before the first reading.
     start: f64,
@@ -84,7 +84,7 @@ pub(crate) struct Response {
     pub(crate) shape: usize,
 }
 
-impl Weather {
+impl SceneWeather {
     /// For a record of `length` days, read as finely as its length allows.
     pub(crate) fn draw(rng: &mut Pcg64, covariate: Covariate, length: f64) -> Self {
         let step = if length <= 100.0 {

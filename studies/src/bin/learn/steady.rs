@@ -42,7 +42,7 @@ const NOISE_KINDS: [Noise; 3] = [Noise::White, Noise::Flicker, Noise::Quantised]
 
 /// What was called in one series.
 #[derive(Debug)]
-struct Called {
+struct CreepCalls {
     noise: Noise,
     doubles: bool,
     /// Red, and orange or red, at any time (after the change, where there is one) and after it has settled.
@@ -101,7 +101,7 @@ fn flicker(each: &mut [f64; FLICKERS.len()], generator: &mut impl Rng) -> f64 {
     each.iter().sum::<f64>() / (FLICKERS.len() as f64).sqrt()
 }
 
-fn follow(seed: u64, doubles: bool, network: &Network) -> Called {
+fn follow(seed: u64, doubles: bool, network: &Network) -> CreepCalls {
     let (noise, observations, change) = draw(seed, doubles);
     let values = &observations.values;
     let end = values.last().map_or(0.0, |last| last.t_days);
@@ -113,7 +113,7 @@ fn follow(seed: u64, doubles: bool, network: &Network) -> Called {
     let begin = values.partition_point(|value| value.t_days < from);
     let begin = begin.max(FEWEST_READINGS);
     let step = values.len().saturating_sub(begin).div_ceil(JUDGED).max(1);
-    let mut called = Called {
+    let mut called = CreepCalls {
         noise,
         doubles,
         ever: (false, false),
@@ -136,7 +136,7 @@ fn follow(seed: u64, doubles: bool, network: &Network) -> Called {
     called
 }
 
-fn text(called: &[Called], series: u64) -> anyhow::Result<String> {
+fn text(called: &[CreepCalls], series: u64) -> anyhow::Result<String> {
     let mut out = format!(
         "# Steady creep, and a rate that doubles and stays\n\n\
          Written by `cargo run --release -p studies --bin learn -- --steady {series}`. {series} series of one rate and {series} whose rate doubles at once and stays, \
@@ -148,7 +148,7 @@ fn text(called: &[Called], series: u64) -> anyhow::Result<String> {
          |---|---|---|---|---|---|---|---|\n",
         RATES.0, RATES.1, NOISES.0, NOISES.1, LENGTHS.0, READINGS.1, LENGTHS.0
     );
-    let mut rows: Vec<(String, Vec<&Called>)> = NOISE_KINDS
+    let mut rows: Vec<(String, Vec<&CreepCalls>)> = NOISE_KINDS
         .iter()
         .map(|noise| {
             let own = called.iter().filter(|one| one.noise == *noise);
@@ -157,7 +157,7 @@ fn text(called: &[Called], series: u64) -> anyhow::Result<String> {
         .collect();
     rows.push(("all".to_owned(), called.iter().collect()));
     for (name, own) in rows {
-        let count = |doubles: bool, is: &dyn Fn(&Called) -> bool| {
+        let count = |doubles: bool, is: &dyn Fn(&CreepCalls) -> bool| {
             let own = own.iter().filter(|one| one.doubles == doubles);
             own.filter(|one| is(one)).count()
         };

@@ -2,7 +2,7 @@
 //!
 //! The ranges are wider than the paper's figures by the noise that the reconstruction adds.
 
-use super::la_clapiere::Motion;
+use super::la_clapiere::ReconstructedMotion;
 use anyhow::{Context, Result, ensure};
 use jiff::Timestamp;
 use slipwatch::reading::{Recording, days_since};
@@ -151,7 +151,7 @@ pub(crate) fn la_clapiere(recording: &Recording) -> Result<()> {
 ///
 /// # Errors
 /// Names the first statement that the motion contradicts.
-pub(crate) fn la_clapiere_motion(motions: &[Motion]) -> Result<()> {
+pub(crate) fn la_clapiere_motion(motions: &[ReconstructedMotion]) -> Result<()> {
     let fastest = |years: Range<f64>| {
         let inside = motions.iter().filter(|motion| years.contains(&motion.year));
         inside.map(|motion| motion.velocity).fold(0.0, f64::max)

@@ -95,7 +95,7 @@ pub(crate) struct Day {
 
 /// Displacement and velocity of the benchmark at the start of a day.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Motion {
+pub(crate) struct ReconstructedMotion {
     /// When.
     pub(crate) time: Timestamp,
     /// Decimal year.
@@ -124,7 +124,9 @@ pub(crate) enum Parts {
 pub(crate) fn recording() -> Result<Recording> {
     let days = days()?;
     let noise = ColouredNoise::new(SEED + 2, NOISE_MM, 0.0);
-    let due = |motion: &Motion| motion.time.to_zoned(TimeZone::UTC).day() == FIRST_READING.day();
+    let due = |motion: &ReconstructedMotion| {
+        motion.time.to_zoned(TimeZone::UTC).day() == FIRST_READING.day()
+    };
     let motions = motions(&days, Parts::All)?;
     let readings = motions.iter().filter(|motion| due(motion)).zip(noise);
     let readings = readings.map(|(motion, noise)| Reading {
@@ -159,11 +161,11 @@ pub(crate) fn recording() -> Result<Recording> {
 ///
 /// # Errors
 /// When a constant makes no law or no date.
-pub(crate) fn motions(days: &[Day], parts: Parts) -> Result<Vec<Motion>> {
+pub(crate) fn motions(days: &[Day], parts: Parts) -> Result<Vec<ReconstructedMotion>> {
     let (start, change) = (midnight(FIRST_READING)?, midnight(CHANGE)?);
     let fit = fitted_law()?;
     let solution = Trajectory::solve(&fit, days_since(start, change) + 1.0, Accuracy::Full);
-    let mut motions: Vec<Motion> = Vec::new();
+    let mut motions: Vec<ReconstructedMotion> = Vec::new();
     let mut after: Option<(Law, Block)> = None;
     for day in days.iter().filter(|day| day.time >= start) {
         let velocity = if let Some((law, block)) = &mut after {
@@ -181,7 +183,7 @@ pub(crate) fn motions(days: &[Day], parts: Parts) -> Result<Vec<Motion>> {
         let slip_mm = before.map_or(0.0, |one| {
             one.slip_mm + f64::midpoint(one.velocity, velocity)
         });
-        motions.push(Motion {
+        motions.push(ReconstructedMotion {
             time: day.time,
             year: day.year,
             slip_mm,

@@ -26,7 +26,7 @@ const NOISE: f64 = 0.04;
 /// Invented: correlation of the noise from day to day.
 const NOISE_MEMORY: f64 = 0.3;
 
-struct Benchmark {
+struct VaiontPoint {
     id: &'static str,
     /// Paper: the fitted B/A, to its two decimals.
     m: f64,
@@ -38,8 +38,8 @@ struct Benchmark {
     kappa: f64,
 }
 
-const BENCHMARKS: [Benchmark; 4] = [
-    Benchmark {
+const BENCHMARKS: [VaiontPoint; 4] = [
+    VaiontPoint {
         id: "5",
         m: 1.35,
         v_i: 9.6,
@@ -47,21 +47,21 @@ const BENCHMARKS: [Benchmark; 4] = [
         kappa: 0.0008,
     },
     // 0.998 is 1.00; at 1 itself the law has no x_i, T and D.
-    Benchmark {
+    VaiontPoint {
         id: "50",
         m: 0.998,
         v_i: 5.0,
         r: 0.01471,
         kappa: -0.0004,
     },
-    Benchmark {
+    VaiontPoint {
         id: "63",
         m: 1.24,
         v_i: 9.4,
         r: 0.01379,
         kappa: 0.0007,
     },
-    Benchmark {
+    VaiontPoint {
         id: "67",
         m: 0.99,
         v_i: 6.0,
@@ -121,7 +121,7 @@ pub(crate) fn recording() -> Result<Recording> {
 }
 
 /// Velocity at each day's reading, mm/day: the law's, and noise that the law cannot fit.
-fn velocities(benchmark: &Benchmark, seed: u64) -> Result<Vec<f64>> {
+fn velocities(benchmark: &VaiontPoint, seed: u64) -> Result<Vec<f64>> {
     let law = Unknowns::of(benchmark);
     let velocities = law.velocities()?;
     let noise = ColouredNoise::new(seed, NOISE, NOISE_MEMORY);
@@ -143,7 +143,7 @@ struct Unknowns {
 }
 
 impl Unknowns {
-    fn of(benchmark: &Benchmark) -> Self {
+    fn of(benchmark: &VaiontPoint) -> Self {
         Self {
             v_i: benchmark.v_i,
             shape: [benchmark.r, benchmark.kappa, 1.0 - 1.0 / benchmark.m],

@@ -3,9 +3,9 @@
 use super::as_drawn::{self, AsDrawn};
 use super::claims::{Claim, Readings, claims};
 use super::document_vaiont::vaiont_section;
-use super::given_up::{self, Trial};
+use super::given_up::{self, LossTrial};
 use super::la_clapiere::{self, Fit};
-use super::recorded::{Archive, Kind, decimal_year, vaiont_day, velocities};
+use super::recorded::{Archive, RecordKind, decimal_year, vaiont_day, velocities};
 use super::river::{self, River};
 use super::synthetic::{self, Study};
 use super::vaiont::{self, Benchmark};
@@ -20,14 +20,14 @@ use std::fmt::Write as _;
 #[derive(Debug)]
 pub(crate) struct Studies {
     pub(crate) vaiont: Vec<Benchmark>,
-    pub(crate) vaiont_kind: Kind,
+    pub(crate) vaiont_kind: RecordKind,
     /// Vaiont with an increase that exhausts itself.
-    pub(crate) trials: Vec<Trial>,
+    pub(crate) trials: Vec<LossTrial>,
     /// Vaiont with noise as it is drawn.
     pub(crate) as_drawn: Vec<AsDrawn>,
     /// Displacement of 1982.9 to 1987.9.
     pub(crate) la_clapiere: Series,
-    pub(crate) la_clapiere_kind: Kind,
+    pub(crate) la_clapiere_kind: RecordKind,
     pub(crate) valley: Option<Valley>,
     pub(crate) river: River,
     pub(crate) fits: Vec<Fit>,
@@ -154,7 +154,7 @@ pub(crate) fn text(studies: &Studies) -> Result<String> {
 
 fn introduction(studies: &Studies) -> String {
     let readings = match (&studies.vaiont_kind, &studies.la_clapiere_kind) {
-        (Kind::Reconstruction, Kind::Reconstruction) => RECONSTRUCTED.to_owned(),
+        (RecordKind::Reconstruction, RecordKind::Reconstruction) => RECONSTRUCTED.to_owned(),
         (vaiont, la_clapiere) => format!(
             "The readings were given with `--recordings`. Vaiont: {}. La Clapière: {}.\n",
             vaiont.name(),
@@ -201,7 +201,7 @@ fn agreement(claims: &[Claim], studies: &Studies) -> String {
         };
         let readings = match (claim.readings, kind) {
             (Readings::Synthetic, _) => "synthetic".to_owned(),
-            (Readings::Tuned, Kind::Reconstruction) => "reconstruction †".to_owned(),
+            (Readings::Tuned, RecordKind::Reconstruction) => "reconstruction †".to_owned(),
             (_, kind) => kind.name().to_owned(),
         };
         let verdict = if claim.agrees {
@@ -217,7 +217,7 @@ fn agreement(claims: &[Claim], studies: &Studies) -> String {
         ]
     };
     let rows: Vec<Vec<String>> = claims.iter().map(cells).collect();
-    let is_made = studies.vaiont_kind == Kind::Reconstruction;
+    let is_made = studies.vaiont_kind == RecordKind::Reconstruction;
     format!(
         "## Where ours and the paper agree\n\n{}{}",
         table(&["the paper", "here", "readings", "verdict"], &rows),
@@ -294,7 +294,7 @@ fn valley_text(studies: &Studies) -> String {
     let Some(valley) = &studies.valley else {
         return String::new();
     };
-    let row = |place: &valley::Place| {
+    let row = |place: &valley::ValleyPlace| {
         vec![
             format!("{}", place.m),
             number(place.x_i),

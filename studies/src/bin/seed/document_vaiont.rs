@@ -141,7 +141,7 @@ fn as_drawn_text(studies: &Studies) -> String {
 
 /// What an increase that exhausts itself does to m.
 fn trials_text(studies: &Studies) -> String {
-    let row = |trial: &given_up::Trial| {
+    let row = |trial: &given_up::LossTrial| {
         let mut row = vec![format!("{}", trial.loss_per_day)];
         for (m, gain) in &trial.of {
             row.push(m_text(*m));

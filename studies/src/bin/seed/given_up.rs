@@ -17,14 +17,14 @@ const LAST_DAYS: usize = 4;
 
 /// The readings with a part of their last increase taken away.
 #[derive(Debug, Clone)]
-pub(crate) struct Trial {
+pub(crate) struct LossTrial {
     pub(crate) loss_per_day: f64,
     /// Best m, and the gain of the last days over that of 1/(69.5 - t), of each of [`BENCHMARKS`].
     pub(crate) of: Vec<(Option<f64>, Option<f64>)>,
 }
 
 /// A trial for each loss, the first with none.
-pub(crate) fn trials(recording: &Recording) -> Result<Vec<Trial>> {
+pub(crate) fn trials(recording: &Recording) -> Result<Vec<LossTrial>> {
     let trial = |loss_per_day| {
         let mut of = Vec::new();
         for id in BENCHMARKS {
@@ -34,7 +34,7 @@ pub(crate) fn trials(recording: &Recording) -> Result<Vec<Trial>> {
             let m = fit.best().map(|best| 1.0 / (1.0 - best.law.p));
             of.push((m, last_gain(&series)?));
         }
-        Ok(Trial { loss_per_day, of })
+        Ok(LossTrial { loss_per_day, of })
     };
     LOSSES.into_iter().map(trial).collect()
 }

@@ -20,14 +20,14 @@ const READABLE: [&str; 5] = ["mcap", "csv", "ndjson", "jsonl", "dat"];
 
 /// What the readings of a slope are.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum RecordKind {
     /// Made to fulfil what the paper states.
     Reconstruction,
     /// Anything else, as its file says.
     Other(String),
 }
 
-impl Kind {
+impl RecordKind {
     fn of(recording: &Recording) -> Self {
         match recording.provenance.get("kind") {
             Some(kind) if kind.contains("reconstruction") => Self::Reconstruction,
@@ -58,10 +58,10 @@ impl Kind {
 pub(crate) struct Archive {
     /// Benchmarks 5, 50, 63 and 67: velocity.
     pub(crate) vaiont: Recording,
-    pub(crate) vaiont_kind: Kind,
+    pub(crate) vaiont_kind: RecordKind,
     /// Benchmark 10: displacement.
     pub(crate) la_clapiere: Series,
-    pub(crate) la_clapiere_kind: Kind,
+    pub(crate) la_clapiere_kind: RecordKind,
     /// The Tinée's flow, where the file has one channel.
     pub(crate) flow: Option<Channel>,
 }
@@ -78,8 +78,8 @@ impl Archive {
         let la_clapiere = recording(folder, LA_CLAPIERE)?;
         let displacement = la_clapiere.series(None, Some(Quantity::Displacement))?;
         Ok(Self {
-            vaiont_kind: Kind::of(&vaiont),
-            la_clapiere_kind: Kind::of(&la_clapiere),
+            vaiont_kind: RecordKind::of(&vaiont),
+            la_clapiere_kind: RecordKind::of(&la_clapiere),
             la_clapiere: displacement.clone(),
             flow: la_clapiere.channels.first().cloned(),
             vaiont,

@@ -30,13 +30,13 @@ type Point = [f64; 3];
 
 /// The best end of all simplexes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Found {
+pub(crate) struct SimplexFit {
     pub(crate) m: f64,
     pub(crate) rms: f64,
 }
 
 /// The least rms of a benchmark's velocity.
-pub(crate) fn fit(series: &Series) -> Result<Option<Found>> {
+pub(crate) fn fit(series: &Series) -> Result<Option<SimplexFit>> {
     let mut readings = Vec::new();
     for reading in &series.readings {
         readings.push((vaiont_day(reading.time)?, reading.value));
@@ -64,7 +64,7 @@ pub(crate) fn fit(series: &Series) -> Result<Option<Found>> {
     }
     let best = ends.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
     let best = best.filter(|(_, rms)| rms.is_finite());
-    Ok(best.map(|([m, ..], rms)| Found { m, rms }))
+    Ok(best.map(|([m, ..], rms)| SimplexFit { m, rms }))
 }
 
 /// rms of the velocity about the law with the best D; infinite where there is no law.

@@ -26,27 +26,27 @@ const SEED: u64 = 1987;
 
 /// How a series differs from the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Kind {
+pub(crate) struct SyntheticKind {
     /// When the velocity inflects.
     pub(crate) inflection_years: f64,
     /// Standard deviation of one month's slip about the law's, relative to it.
     pub(crate) scatter: f64,
 }
 
-pub(crate) const KINDS: [Kind; 4] = [
-    Kind {
+pub(crate) const KINDS: [SyntheticKind; 4] = [
+    SyntheticKind {
         inflection_years: 4.0,
         scatter: 0.0,
     },
-    Kind {
+    SyntheticKind {
         inflection_years: 4.0,
         scatter: 0.1,
     },
-    Kind {
+    SyntheticKind {
         inflection_years: 6.0,
         scatter: 0.1,
     },
-    Kind {
+    SyntheticKind {
         inflection_years: 6.0,
         scatter: 0.3,
     },
@@ -69,7 +69,7 @@ pub(crate) struct Draw {
 #[derive(Debug)]
 pub(crate) struct Study {
     pub(crate) quantity: Quantity,
-    pub(crate) kind: Kind,
+    pub(crate) kind: SyntheticKind,
     pub(crate) draws: Vec<Draw>,
 }
 
@@ -85,7 +85,7 @@ pub(crate) fn studies(count: u64) -> Result<Vec<Study>> {
 }
 
 /// Inverts `count` series of one kind.
-pub(crate) fn study(quantity: Quantity, kind: Kind, count: u64) -> Result<Study> {
+pub(crate) fn study(quantity: Quantity, kind: SyntheticKind, count: u64) -> Result<Study> {
     let draws = (0..count).map(|index| {
         let displacements = series(SEED + index, &kind)?;
         match quantity {
@@ -110,7 +110,7 @@ pub(crate) fn law(inflection_years: f64) -> Result<Law> {
 }
 
 /// Displacements in mm; the same seed gives the same series.
-fn series(seed: u64, kind: &Kind) -> Result<Series> {
+fn series(seed: u64, kind: &SyntheticKind) -> Result<Series> {
     let law = law(kind.inflection_years)?;
     let end = f64::from(MONTHS) * DAYS_PER_MONTH;
     let solution = Trajectory::solve(&law, end, Accuracy::Full);

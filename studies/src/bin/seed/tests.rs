@@ -3,7 +3,7 @@
 use crate::claims::{Readings, claims};
 use crate::claims_vaiont::{excess_below_one, has_the_papers_m, line_day};
 use crate::document::Studies;
-use crate::recorded::{Archive, Kind};
+use crate::recorded::{Archive, RecordKind};
 use crate::vaiont::Benchmark;
 use slipwatch::reading::Quantity;
 use slipwatch::regime::Regime;
@@ -131,7 +131,7 @@ fn an_increase_that_exhausts_itself_moves_m_away_from_the_papers() {
     assert!(none.loss_per_day.abs() < f64::EPSILON && most.loss_per_day > 0.03);
     let paper = [1.35, 1.24, 1.00];
     for (index, m) in paper.into_iter().enumerate() {
-        let of = |trial: &crate::given_up::Trial| (trial.of[index].0.unwrap() - m).abs();
+        let of = |trial: &crate::given_up::LossTrial| (trial.of[index].0.unwrap() - m).abs();
         assert!(of(none) <= 0.05 && of(most) > 0.3, "{none:?} {most:?}");
     }
 }
@@ -255,7 +255,10 @@ fn other_readings_in_a_folder_are_studied_and_called_no_reconstruction() {
         slipwatch::runtime::ingest::write_mcap(recording, &file).unwrap();
     }
     let archive = Archive::of(folder.path()).unwrap();
-    assert_eq!(archive.vaiont_kind, Kind::Other("measured".to_owned()));
+    assert_eq!(
+        archive.vaiont_kind,
+        RecordKind::Other("measured".to_owned())
+    );
     assert_eq!(archive.vaiont.series, own.vaiont.series);
     assert_eq!(archive.la_clapiere, own.la_clapiere);
     let studies = Studies::run(1, &archive).unwrap();
@@ -322,7 +325,7 @@ fn of_synthetic_displacements_m_below_one_is_recovered_and_m_is_not() {
 
 /// Median widths of the interval of m where slip does not scatter and where it scatters by 30 %.
 fn widths_of_m() -> (f64, f64) {
-    let width = |kind: crate::synthetic::Kind| {
+    let width = |kind: crate::synthetic::SyntheticKind| {
         let study = crate::synthetic::study(Quantity::Displacement, kind, SYNTHETICS).unwrap();
         study.quantile(0.5, |draw| draw.interval.1 - draw.interval.0)
     };

@@ -1,7 +1,7 @@
 //! Vaiont: m, the regime and the time of failure of the four benchmarks, and the exponent alpha.
 
 use super::recorded::{displacements, report};
-use super::simplex::{self, Found};
+use super::simplex::{self, SimplexFit};
 use anyhow::Result;
 use slipwatch::fit::{ConstantLoad, Exponent};
 use slipwatch::inversion::{Alternative, FitReport, Inversion, InversionOptions};
@@ -25,7 +25,7 @@ pub(crate) struct Benchmark {
     /// The same with its laws.
     pub(crate) least_squares: ConstantLoad,
     /// By simplexes over the paper's unknowns.
-    pub(crate) simplex: Option<Found>,
+    pub(crate) simplex: Option<SimplexFit>,
     /// With the paper's m imposed.
     pub(crate) at_paper_m: ConstantLoad,
     /// From the velocities summed to displacements.

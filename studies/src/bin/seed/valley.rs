@@ -15,7 +15,7 @@ const IMPOSED: [f64; 12] = [
 
 /// The best fit with m imposed.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct ValleyPlace {
     pub(crate) m: f64,
     pub(crate) x_i: Option<f64>,
     pub(crate) t_days: Option<f64>,
@@ -27,12 +27,12 @@ pub(crate) struct Place {
 #[derive(Debug, Clone)]
 pub(crate) struct Valley {
     pub(crate) least_rms: f64,
-    pub(crate) places: Vec<Place>,
+    pub(crate) places: Vec<ValleyPlace>,
 }
 
 impl Valley {
     /// The places whose rms is within a share of the least.
-    fn within(&self, share: f64) -> impl Iterator<Item = &Place> {
+    fn within(&self, share: f64) -> impl Iterator<Item = &ValleyPlace> {
         let highest = (1.0 + share) * self.least_rms;
         self.places.iter().filter(move |place| place.rms <= highest)
     }
@@ -68,7 +68,7 @@ pub(crate) fn valley(series: &Series) -> Option<Valley> {
     let place = |m: f64| {
         let fit = best(Exponent::Fixed(m))?;
         let paper = fit.law.paper();
-        Some(Place {
+        Some(ValleyPlace {
             m,
             x_i: paper.x_i,
             t_days: paper.t_unit_days,

@@ -6,7 +6,7 @@ use studies::{Corpus, Life};
 
 /// What a series is. Scores of one kind say nothing of another, and stand apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Kind {
+pub(crate) enum SubjectKind {
     /// Instruments' readings.
     Measured,
     /// Made to fulfil what a publication states.
@@ -15,7 +15,7 @@ pub(crate) enum Kind {
     Simulated,
 }
 
-impl Kind {
+impl SubjectKind {
     const ALL: [Self; 3] = [Self::Measured, Self::Reconstruction, Self::Simulated];
 
     pub(crate) fn of(name: &str) -> Option<Self> {
@@ -33,14 +33,14 @@ impl Kind {
 
 /// What is known now of how it went, days since the first reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Truth {
+pub(crate) enum SubjectTruth {
     /// It failed then.
     FailedAt(f64),
     /// It had not failed by then, where its record ends.
     StoodUntil(f64),
 }
 
-impl Truth {
+impl SubjectTruth {
     /// As seen from `now_days`.
     pub(crate) fn from(self, now_days: f64) -> Outcome {
         match self {
@@ -52,15 +52,15 @@ impl Truth {
 
 /// One series.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Subject {
+pub(crate) struct SkillSubject {
     pub(crate) name: String,
-    pub(crate) kind: Kind,
+    pub(crate) kind: SubjectKind,
     /// The site, or the fate of a simulated life.
     pub(crate) family: String,
     /// Of the first reading, which is day 0; `None` of a simulated life.
     pub(crate) epoch: Option<Timestamp>,
     pub(crate) history: WholeRecord,
-    pub(crate) truth: Truth,
+    pub(crate) truth: SubjectTruth,
     /// Days before the failure at which it is looked at; of no use where it stood.
     pub(crate) leads: Vec<f64>,
     /// Looks evenly over its readings, beside the leads.
@@ -87,15 +87,15 @@ pub(crate) const LOOKS_AT_FAILING: usize = 10;
 /// A tenth of a millisecond, days: a reading at the lead itself is known, whatever the rounding of the two.
 const ROUNDING: f64 = 1e-9;
 
-impl Subject {
+impl SkillSubject {
     fn simulated(name: String, life: &Life) -> Self {
         let end = life.readings.last().map_or(0.0, |(days, _)| *days);
         let truth = life
             .failure_days
-            .map_or(Truth::StoodUntil(end), Truth::FailedAt);
+            .map_or(SubjectTruth::StoodUntil(end), SubjectTruth::FailedAt);
         Self {
             name,
-            kind: Kind::Simulated,
+            kind: SubjectKind::Simulated,
             epoch: None,
             family: format!("{:?}", life.fate).to_lowercase(),
             history: WholeRecord {
@@ -104,8 +104,8 @@ impl Subject {
                 critical_mm_per_day: Life::CRITICAL_MM_PER_DAY,
             },
             spread: match truth {
-                Truth::FailedAt(_) => LOOKS_AT_FAILING,
-                Truth::StoodUntil(_) => LOOKS,
+                SubjectTruth::FailedAt(_) => LOOKS_AT_FAILING,
+                SubjectTruth::StoodUntil(_) => LOOKS,
             },
             truth,
             leads: [&SIMULATED_LEADS[..], &SHORT_LEADS[..]].concat(),
@@ -115,9 +115,9 @@ impl Subject {
     /// When forecasts are made of it. A lead that a gap in the readings makes more than twice as long is left out.
     pub(crate) fn looks(&self) -> Vec<Evaluation> {
         let (end, leads) = match self.truth {
-            Truth::FailedAt(failure) => (failure, &self.leads[..]),
+            SubjectTruth::FailedAt(failure) => (failure, &self.leads[..]),
             // At the end nothing can come any more that would score.
-            Truth::StoodUntil(end) => (end, &[][..]),
+            SubjectTruth::StoodUntil(end) => (end, &[][..]),
         };
         let at_lead = |lead: &f64| {
             let values = &self.history.observations.values;
@@ -160,13 +160,13 @@ impl Subject {
 /// All series, in one order; the simulated ones are drawn when they are asked for.
 #[derive(Debug)]
 pub(crate) struct Subjects {
-    recorded: Vec<Subject>,
+    recorded: Vec<SkillSubject>,
     corpus: Corpus,
     simulated: u64,
 }
 
 impl Subjects {
-    pub(crate) fn new(recorded: Vec<Subject>, corpus: Corpus, simulated: u64) -> Self {
+    pub(crate) fn new(recorded: Vec<SkillSubject>, corpus: Corpus, simulated: u64) -> Self {
         Self {
             recorded,
             corpus,
@@ -178,14 +178,14 @@ impl Subjects {
         self.recorded.len() as u64 + self.simulated
     }
 
-    pub(crate) fn at(&self, index: u64) -> Subject {
+    pub(crate) fn at(&self, index: u64) -> SkillSubject {
         let recorded = usize::try_from(index)
             .ok()
             .and_then(|at| self.recorded.get(at));
         recorded.cloned().unwrap_or_else(|| {
             let index = index - self.recorded.len() as u64;
             let seed = self.corpus.seeds().start + index;
-            Subject::simulated(format!("seed {seed}"), &self.corpus.life(index))
+            SkillSubject::simulated(format!("seed {seed}"), &self.corpus.life(index))
         })
     }
 }

@@ -1,6 +1,6 @@
 //! The records as lines of JSON, written and read again.
 
-use crate::corpus::Kind;
+use crate::corpus::SubjectKind;
 use crate::record::{HORIZONS_DAYS, Record, SeriesForecasts};
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
@@ -45,7 +45,8 @@ pub(crate) fn read(lines: &str) -> Result<Vec<SeriesForecasts>> {
         if series.last().is_none_or(|last| last.name != line.series) {
             series.push(SeriesForecasts {
                 name: line.series.clone(),
-                kind: Kind::of(&line.kind).with_context(|| format!("no kind {}", line.kind))?,
+                kind: SubjectKind::of(&line.kind)
+                    .with_context(|| format!("no kind {}", line.kind))?,
                 family: line.family.clone(),
                 epoch: line.epoch,
                 records: Vec::new(),

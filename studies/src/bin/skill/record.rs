@@ -1,6 +1,6 @@
 //! One forecast as it was made, in short.
 
-use crate::corpus::{Evaluation, Kind, Subject};
+use crate::corpus::{Evaluation, SkillSubject, SubjectKind};
 use slipwatch::forecast::Passage;
 use slipwatch::reading::Timestamp;
 use slipwatch::score::{Known, Method, Outcome, is_covered};
@@ -14,7 +14,7 @@ pub(crate) const HORIZONS_DAYS: [f64; 6] = [0.25, 1.0, 2.0, 3.0, 10.0, 30.0];
 #[derive(Debug, Clone)]
 pub(crate) struct SeriesForecasts {
     pub(crate) name: String,
-    pub(crate) kind: Kind,
+    pub(crate) kind: SubjectKind,
     pub(crate) family: String,
     /// Of the first reading; `None` of a simulated life.
     pub(crate) epoch: Option<Timestamp>,
@@ -44,7 +44,12 @@ pub(crate) struct Record {
 
 impl Record {
     /// What `method` says at one look, of what is `known` by then.
-    pub(crate) fn of(subject: &Subject, look: &Evaluation, known: &Known, method: &Method) -> Self {
+    pub(crate) fn of(
+        subject: &SkillSubject,
+        look: &Evaluation,
+        known: &Known,
+        method: &Method,
+    ) -> Self {
         let said = (method.forecast)(known);
         let outcome = subject.truth.from(known.now_days);
         let after = match outcome {

@@ -4,7 +4,7 @@
 //! velocity would say nothing of it. What was measured of 40-1938 at Century Mine stands in two files, with
 //! different zeros and other days, and is scored from each.
 
-use crate::corpus::{Kind, LOOKS, Subject, Truth};
+use crate::corpus::{LOOKS, SkillSubject, SubjectKind, SubjectTruth};
 use anyhow::{Context, Result};
 use jiff::SignedDuration;
 use slipwatch::reading::{Recording, Series, Timestamp, days_since};
@@ -31,7 +31,7 @@ enum End {
 #[derive(Debug)]
 struct Source {
     heading: &'static str,
-    kind: Kind,
+    kind: SubjectKind,
     file: &'static str,
     /// Velocities are means over so many hours before their time.
     averaging_hours: Option<i64>,
@@ -98,7 +98,7 @@ const SOURCES: [Source; 12] = [
 ];
 
 /// Every series that is at hand; tells `left_out` the heading of one that is not.
-pub(crate) fn load(left_out: impl Fn(&str)) -> Result<Vec<Subject>> {
+pub(crate) fn load(left_out: impl Fn(&str)) -> Result<Vec<SkillSubject>> {
     let mut subjects = Vec::new();
     for source in &SOURCES {
         let Some(file) = source.file() else {
@@ -117,7 +117,7 @@ impl Source {
     const fn measured(heading: &'static str, file: &'static str, end: End) -> Self {
         Self {
             heading,
-            kind: Kind::Measured,
+            kind: SubjectKind::Measured,
             file,
             averaging_hours: None,
             flow: None,
@@ -128,7 +128,7 @@ impl Source {
     const fn reconstructed(heading: &'static str, file: &'static str, end: End) -> Self {
         let source = Self::measured(heading, file, end);
         Self {
-            kind: Kind::Reconstruction,
+            kind: SubjectKind::Reconstruction,
             ..source
         }
     }
@@ -157,7 +157,7 @@ impl Source {
         studies::measured(self.file)
     }
 
-    fn subjects(&self, file: PathBuf) -> Result<Vec<Subject>> {
+    fn subjects(&self, file: PathBuf) -> Result<Vec<SkillSubject>> {
         let options = ReadOptions {
             averaging: self.averaging_hours.map(SignedDuration::from_hours),
             ..ReadOptions::default()
@@ -169,15 +169,15 @@ impl Source {
             .collect()
     }
 
-    fn subject(&self, series: &Series, recording: &Recording) -> Result<Subject> {
+    fn subject(&self, series: &Series, recording: &Recording) -> Result<SkillSubject> {
         let readings = &series.readings;
         let (Some(first), Some(last)) = (readings.first(), readings.last()) else {
             anyhow::bail!("{}: no readings", series.benchmark);
         };
         let day = |time: Timestamp| days_since(first.time, time);
         let (truth, leads) = match self.end {
-            End::Failed { at, leads } => (Truth::FailedAt(day(at.parse()?)), leads),
-            End::Stood => (Truth::StoodUntil(day(last.time)), &[][..]),
+            End::Failed { at, leads } => (SubjectTruth::FailedAt(day(at.parse()?)), leads),
+            End::Stood => (SubjectTruth::StoodUntil(day(last.time)), &[][..]),
         };
         let named = |name| {
             let mut channels = recording.channels.iter();
@@ -187,20 +187,20 @@ impl Source {
         let river = self.flow.map(named).transpose()?;
         let channels = river.map_or(&[][..], std::slice::from_ref);
         let mut history = WholeRecord::of(series, channels, CRITICAL_MM_PER_DAY);
-        if let Truth::FailedAt(failure) = truth {
+        if let SubjectTruth::FailedAt(failure) = truth {
             let values = &mut history.observations.values;
             values.retain(|value| value.t_days <= failure);
         }
         let benchmark = series.benchmark.as_str();
-        Ok(Subject {
+        Ok(SkillSubject {
             name: format!("{}, {benchmark}", self.heading),
             kind: self.kind,
             family: self.heading.to_owned(),
             epoch: Some(first.time),
             history,
             spread: match truth {
-                Truth::FailedAt(_) => 0,
-                Truth::StoodUntil(_) => LOOKS,
+                SubjectTruth::FailedAt(_) => 0,
+                SubjectTruth::StoodUntil(_) => LOOKS,
             },
             truth,
             leads: leads.to_vec(),

@@ -1,7 +1,7 @@
 //! What is reported of measured and reconstructed series.
 
 use crate::chances::{Called, share_called};
-use crate::corpus::Kind;
+use crate::corpus::SubjectKind;
 use crate::record::{Record, SeriesForecasts};
 use crate::sums::{PANEL, Scored, average, crps, error_days, grid, percent, sums};
 use slipwatch::score::{METHODS, Outcome};
@@ -124,7 +124,9 @@ fn place(one: &SeriesForecasts) -> &str {
 /// CRPS over the time that remained, of every method, the measured places that failed each counted once.
 fn each_site_once(out: &mut String, scored: &Scored) {
     let failed = scored.failed.iter().copied();
-    let measured: Vec<&SeriesForecasts> = failed.filter(|one| one.kind == Kind::Measured).collect();
+    let measured: Vec<&SeriesForecasts> = failed
+        .filter(|one| one.kind == SubjectKind::Measured)
+        .collect();
     let mut places: Vec<&str> = measured.iter().map(|one| place(one)).collect();
     places.dedup();
     let mut rows: Vec<(f64, Vec<String>)> = Vec::new();

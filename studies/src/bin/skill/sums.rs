@@ -1,6 +1,6 @@
 //! Scores gathered by series, and how figures are written.
 
-use crate::corpus::Kind;
+use crate::corpus::SubjectKind;
 use crate::record::{Record, SeriesForecasts};
 use slipwatch::forecast::{HORIZON_DAYS, Passage};
 use slipwatch::score::{Interval, Sum, crps_days, mean, scored_days};
@@ -31,7 +31,7 @@ impl<'a> Scored<'a> {
             let is_meant = |one: &&SeriesForecasts| {
                 let mut ends = one.records.iter().map(Record::remaining_days);
                 let has_failed = ends.any(|days| days.is_some());
-                (one.kind == Kind::Simulated) == simulated && has_failed == failed
+                (one.kind == SubjectKind::Simulated) == simulated && has_failed == failed
             };
             series.iter().filter(is_meant).collect()
         };

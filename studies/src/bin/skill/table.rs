@@ -1,6 +1,6 @@
 //! The scores, a table for each site and each fate, a row for each lead and method.
 
-use crate::corpus::Kind;
+use crate::corpus::SubjectKind;
 use crate::record::{Record, SeriesForecasts};
 use crate::sums::{SEED, cell, crps, one_if, said, sums};
 use slipwatch::score::{Method, Sum, log_score, mean, ratio};
@@ -20,7 +20,7 @@ one site share their failure, so the intervals of several are too narrow; one se
 /// The whole text.
 pub(crate) fn text(series: &[SeriesForecasts], methods: &[&Method]) -> String {
     let mut out = ABOUT.to_owned();
-    let families: BTreeSet<(Kind, &str)> = series
+    let families: BTreeSet<(SubjectKind, &str)> = series
         .iter()
         .map(|one| (one.kind, one.family.as_str()))
         .collect();
