@@ -1,7 +1,7 @@
 //! How the alarm of each place stands, by the names of ISA-18.2 (ANSI/ISA-18.2-2016, "Management of Alarm Systems for the
 //! Process Industries"), from the events in a site's state.
 
-use super::standing::{TakenOrders, every};
+use super::standing::{NumberedEvent, TakenOrders, every};
 use crate::alert::Level;
 use crate::monitor::{
     AlertState, CalledLevel, Declared, Event, EventKind, OrderKind, REMOVED, by_time,
@@ -71,7 +71,7 @@ pub struct Alarms {
     /// What people have ordered.
     orders: TakenOrders,
     /// Orders by which nobody is notified, with their numbers among the events.
-    silences: Vec<(i64, Event)>,
+    silences: Vec<NumberedEvent>,
     /// Benchmarks under declared maintenance; `None`: the whole site.
     out_of_service: Vec<Option<BenchmarkId>>,
 }
@@ -101,7 +101,7 @@ impl Alarms {
         }
         let orders = TakenOrders::read(store, at)?;
         for one in newest.values_mut() {
-            one.is_acknowledged = orders.of(&one.event).any(|(_, order)| says_seen(order));
+            one.is_acknowledged = orders.of(&one.event).any(|order| says_seen(&order.event));
         }
         Ok(Self {
             newest,
@@ -205,7 +205,8 @@ impl Alarms {
         newest: Option<&NewestAlert>,
     ) -> Option<AlarmState> {
         let mut found = None;
-        for (number, event) in &self.silences {
+        for silence in &self.silences {
+            let event = &silence.event;
             if event.benchmark.is_some() && event.benchmark.as_ref() != place {
                 continue;
             }
@@ -216,7 +217,7 @@ impl Alarms {
                 return Some(AlarmState::Suppressed);
             }
             // A level that was called after the order is higher than the one that it is of.
-            let concerns = |alert: &Event| self.orders.concerns((*number, event), alert);
+            let concerns = |alert: &Event| self.orders.concerns(silence, alert);
             let is_of_it = newest.is_none_or(|one| one.has_ended || concerns(&one.event));
             found = found.or(is_of_it.then_some(AlarmState::Shelved));
         }

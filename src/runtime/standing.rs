@@ -110,6 +110,13 @@ fn gone_on_with(called: &Event, event: &Event) -> Event {
     first
 }
 
+/// An event with its number in the state.
+#[derive(Debug, Clone)]
+pub(super) struct NumberedEvent {
+    pub(super) number: i64,
+    pub(super) event: Event,
+}
+
 /// Every event of a kind, oldest first.
 ///
 /// # Errors
@@ -123,8 +130,8 @@ pub fn every(store: &Store, kind: &str) -> Result<Vec<Event>, StoreError> {
 /// # Errors
 /// [`StoreError`].
 pub(super) fn every_until(store: &Store, kind: &str, last: i64) -> Result<Vec<Event>, StoreError> {
-    let numbered = numbered_between(store, kind, (0, last))?;
-    Ok(numbered.into_iter().map(|(_, event)| event).collect())
+    let numbered = numbered_between(store, kind, 0, last)?;
+    Ok(numbered.into_iter().map(|one| one.event).collect())
 }
 
 /// Every event of a kind after number `after`, oldest first.
@@ -132,23 +139,24 @@ pub(super) fn every_until(store: &Store, kind: &str, last: i64) -> Result<Vec<Ev
 /// # Errors
 /// [`StoreError`].
 pub(super) fn every_since(store: &Store, kind: &str, after: i64) -> Result<Vec<Event>, StoreError> {
-    let numbered = numbered_between(store, kind, (after, i64::MAX))?;
-    Ok(numbered.into_iter().map(|(_, event)| event).collect())
+    let numbered = numbered_between(store, kind, after, i64::MAX)?;
+    Ok(numbered.into_iter().map(|one| one.event).collect())
 }
 
 /// Every event of a kind with its number, oldest first.
 ///
 /// # Errors
 /// [`StoreError`].
-pub(super) fn numbered(store: &Store, kind: &str) -> Result<Vec<(i64, Event)>, StoreError> {
-    numbered_between(store, kind, (0, i64::MAX))
+pub(super) fn numbered(store: &Store, kind: &str) -> Result<Vec<NumberedEvent>, StoreError> {
+    numbered_between(store, kind, 0, i64::MAX)
 }
 
 fn numbered_between(
     store: &Store,
     kind: &str,
-    (mut after, last): (i64, i64),
-) -> Result<Vec<(i64, Event)>, StoreError> {
+    mut after: i64,
+    last: i64,
+) -> Result<Vec<NumberedEvent>, StoreError> {
     let mut all = Vec::new();
     loop {
         let events = store.events(after, Some(kind), None)?;
@@ -160,7 +168,10 @@ fn numbered_between(
             if *number > last {
                 return Ok(all);
             }
-            all.push((*number, read(body)?));
+            all.push(NumberedEvent {
+                number: *number,
+                event: read(body)?,
+            });
         }
     }
 }
@@ -172,7 +183,7 @@ fn numbered_between(
 #[derive(Debug)]
 pub struct TakenOrders {
     /// By number, oldest first.
-    taken: Vec<(i64, Event)>,
+    taken: Vec<NumberedEvent>,
     /// The number of the event that called an alert last, by its key.
     called: BTreeMap<String, i64>,
     /// Whether they are those of the past, whose clock was another.
@@ -185,12 +196,14 @@ impl TakenOrders {
     /// # Errors
     /// [`StoreError`].
     pub fn read(store: &Store, at: Option<Timestamp>) -> Result<Self, StoreError> {
-        let is_known = |(_, event): &(i64, Event)| at.is_none_or(|at| event.time <= at);
+        let is_known = |one: &NumberedEvent| at.is_none_or(|at| one.event.time <= at);
         let mut taken = numbered(store, "order")?;
         taken.retain(is_known);
         let mut called = BTreeMap::new();
         if !taken.is_empty() {
-            for (number, event) in numbered(store, "alert")?.into_iter().filter(is_known) {
+            for NumberedEvent { number, event } in
+                numbered(store, "alert")?.into_iter().filter(is_known)
+            {
                 if let EventKind::Alert {
                     state: AlertState::Firing,
                     key,
@@ -209,14 +222,15 @@ impl TakenOrders {
     }
 
     /// The orders that are of this alert, with their numbers, oldest first.
-    pub(super) fn of<'a>(&'a self, alert: &'a Event) -> impl Iterator<Item = &'a (i64, Event)> {
+    pub(super) fn of<'a>(&'a self, alert: &'a Event) -> impl Iterator<Item = &'a NumberedEvent> {
         let taken = self.taken.iter();
-        taken.filter(move |(number, order)| self.concerns((*number, order), alert))
+        taken.filter(move |order| self.concerns(order, alert))
     }
 
     /// Whether the order is of this alert: it had been called when the order was given and taken, and the order names it or all at
     /// its place.
-    pub(super) fn concerns(&self, (number, order): (i64, &Event), alert: &Event) -> bool {
+    pub(super) fn concerns(&self, order: &NumberedEvent, alert: &Event) -> bool {
+        let (number, order) = (order.number, &order.event);
         let EventKind::Alert { key, .. } = &alert.kind else {
             return false;
         };
@@ -235,12 +249,13 @@ impl TakenOrders {
     /// Those in force at `now` by which no hook is run, as they were given.
     pub fn silences(&self, now: Timestamp) -> Vec<Event> {
         let standing = self.numbered_silences(now).into_iter();
-        standing.map(|(_, event)| event).collect()
+        standing.map(|one| one.event).collect()
     }
 
-    pub(super) fn numbered_silences(&self, now: Timestamp) -> Vec<(i64, Event)> {
-        let mut standing: Vec<(i64, Event)> = Vec::new();
-        for (number, event) in &self.taken {
+    pub(super) fn numbered_silences(&self, now: Timestamp) -> Vec<NumberedEvent> {
+        let mut standing: Vec<NumberedEvent> = Vec::new();
+        for taken in &self.taken {
+            let event = &taken.event;
             let EventKind::Order {
                 order,
                 until,
@@ -253,19 +268,19 @@ impl TakenOrders {
             let given_at = given.given_at.filter(|_| !self.are_past);
             if *order == OrderKind::Unsilence {
                 let place = &event.benchmark;
-                standing.retain(|(_, one)| place.is_some() && one.benchmark != *place);
+                standing.retain(|one| place.is_some() && one.event.benchmark != *place);
                 continue;
             }
             // The newest of a kind says how long, also when its own time is over.
             if until.is_some() {
-                let is_other = |(_, one): &(i64, Event)| {
-                    one.benchmark != event.benchmark
-                        || !matches!(&one.kind, EventKind::Order { order: own, .. } if own == order)
+                let is_other = |one: &NumberedEvent| {
+                    one.event.benchmark != event.benchmark
+                        || !matches!(&one.event.kind, EventKind::Order { order: own, .. } if own == order)
                 };
                 standing.retain(is_other);
             }
             if until.is_some_and(|until| lasts((given_at, until), now)) {
-                standing.push((*number, event.clone()));
+                standing.push(taken.clone());
             }
         }
         standing
@@ -273,12 +288,12 @@ impl TakenOrders {
 
     /// Who has seen what is in force.
     pub fn acknowledged(&self, in_force: &InForce) -> Vec<Event> {
-        let is_of_one = |(number, order): &&(i64, Event)| {
-            is_acknowledgement(order)
-                && (in_force.values()).any(|alert| self.concerns((*number, order), alert))
+        let is_of_one = |order: &&NumberedEvent| {
+            is_acknowledgement(&order.event)
+                && (in_force.values()).any(|alert| self.concerns(order, alert))
         };
         let seen = self.taken.iter().filter(is_of_one);
-        seen.map(|(_, order)| order.clone()).collect()
+        seen.map(|order| order.event.clone()).collect()
     }
 
     /// The newest acknowledgement of each alert in force that has one, by the alert's key.
@@ -287,8 +302,8 @@ impl TakenOrders {
             let EventKind::Alert { key, .. } = &alert.kind else {
                 return None;
             };
-            let seen = self.of(alert).filter(|(_, one)| is_acknowledgement(one));
-            Some((key.clone(), seen.last()?.1.clone()))
+            let seen = self.of(alert).filter(|one| is_acknowledgement(&one.event));
+            Some((key.clone(), seen.last()?.event.clone()))
         });
         each.collect()
     }

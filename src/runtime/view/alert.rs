@@ -7,7 +7,7 @@ use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::clock;
 use crate::runtime::standing::{
-    TakenOrders, every, first_call, in_force, is_acknowledgement, numbered,
+    NumberedEvent, TakenOrders, every, first_call, in_force, is_acknowledgement, numbered,
 };
 use crate::store::{DeliveryRow, LATEST, Store, StoreError};
 use schemars::JsonSchema;
@@ -236,7 +236,7 @@ fn is_same_call(one: &Event, other: &Event) -> bool {
 }
 
 /// How the alert stands by now, and since when it is over.
-fn end(alerts: &[(i64, Event)], call: &StoredCall) -> AlertEnd {
+fn end(alerts: &[NumberedEvent], call: &StoredCall) -> AlertEnd {
     let mut end = AlertEnd {
         state: AlertLife::Resolved,
         time: None,
@@ -252,7 +252,7 @@ fn end(alerts: &[(i64, Event)], call: &StoredCall) -> AlertEnd {
     };
     end.state = AlertLife::Firing;
     let called = call.event.time;
-    for (number, event) in alerts {
+    for NumberedEvent { number, event } in alerts {
         let EventKind::Alert {
             key, level, state, ..
         } = &event.kind
@@ -285,7 +285,7 @@ fn end(alerts: &[(i64, Event)], call: &StoredCall) -> AlertEnd {
 /// Changes of the alert, orders that concern it and corrections of what it rests on.
 fn audit(
     store: &Store,
-    alerts: &[(i64, Event)],
+    alerts: &[NumberedEvent],
     call: &StoredCall,
     end: &AlertEnd,
 ) -> Result<Vec<Event>, StoreError> {
@@ -296,9 +296,9 @@ fn audit(
         matches!(&event.kind, EventKind::Alert { key, .. } if key == own_key)
             || is_same_call(event, &call.event)
     };
-    let each = alerts.iter().map(|(_, event)| event);
+    let each = alerts.iter().map(|one| &one.event);
     let mut audit: Vec<Event> = each.filter(is_own).cloned().collect();
-    for (number, event) in TakenOrders::read(store, None)?.of(&call.event) {
+    for NumberedEvent { number, event } in TakenOrders::read(store, None)?.of(&call.event) {
         let is_in_time = end.number.is_none_or(|end| *number <= end);
         if is_in_time || is_acknowledgement(event) && is_before_the_next(alerts, call, *number) {
             audit.push(event.clone());
@@ -314,15 +314,15 @@ fn audit(
 }
 
 /// Whether the event with this number came before another alert was called in the place of this one.
-fn is_before_the_next(alerts: &[(i64, Event)], call: &StoredCall, number: i64) -> bool {
-    let is_next = |(other, event): &&(i64, Event)| {
+fn is_before_the_next(alerts: &[NumberedEvent], call: &StoredCall, number: i64) -> bool {
+    let is_next = |NumberedEvent { number, event }: &&NumberedEvent| {
         matches!(&event.kind, EventKind::Alert { state: AlertState::Firing, level, .. } if *level != Level::Unknown)
             && event.benchmark == call.event.benchmark
-            && *other > call.number
+            && *number > call.number
             && event.time >= call.event.time
     };
     let next = alerts.iter().find(is_next);
-    next.is_none_or(|(next, _)| number < *next)
+    next.is_none_or(|next| number < next.number)
 }
 
 fn alarm_state(
