@@ -67,6 +67,13 @@ pub struct Driven {
     pub slip: Vec<f64>,
 }
 
+/// What the log-load is at one time.
+#[derive(Debug, Clone, Copy)]
+struct LoadPoint {
+    t: f64,
+    log_load: f64,
+}
+
 #[derive(Debug, Clone, Copy)]
 struct State {
     ln_y: f64,
@@ -117,21 +124,22 @@ impl Driven {
         };
         let mut state = friction.state(0.0, 0.0, first, still);
         let (mut extra, mut events) = (0.0, drive.events.iter().peekable());
-        for (k, (&t, &f)) in drive.nodes.iter().zip(drive.log_load).enumerate() {
+        for (k, (&t, &log_load)) in drive.nodes.iter().zip(drive.log_load).enumerate() {
             // Where the block has come to, and the load declared there.
-            let mut here = match k.checked_sub(1) {
-                Some(before) => (drive.nodes[before], drive.log_load[before]),
-                None => (t, f),
-            };
+            let node = LoadPoint { t, log_load };
+            let mut here = k.checked_sub(1).map_or(node, |before| LoadPoint {
+                t: drive.nodes[before],
+                log_load: drive.log_load[before],
+            });
             loop {
                 let event = events.next_if(|event| event.node <= k);
                 let there = match event {
-                    Some(event) if event.early > 0.0 => between(here, (t, f), t - event.early),
-                    _ => (t, f),
+                    Some(event) if event.early > 0.0 => between(here, node, t - event.early),
+                    _ => node,
                 };
-                if there.0 > here.0 {
-                    let loads = (here.1 + extra, there.1 + extra);
-                    let Some(next) = friction.cross(state, there.0 - here.0, loads) else {
+                if there.t > here.t {
+                    let (from, to) = (here.log_load + extra, there.log_load + extra);
+                    let Some(next) = friction.cross(state, there.t - here.t, from, to) else {
                         return false;
                     };
                     (state, here) = (next, there);
@@ -140,7 +148,7 @@ impl Driven {
                 extra += event.log_load;
                 friction.change(event);
                 let ln_y = state.ln_y + event.ln_y;
-                state = friction.state(ln_y, state.slip, here.1 + extra, state.speed);
+                state = friction.state(ln_y, state.slip, here.log_load + extra, state.speed);
             }
             self.ln_y.push(state.ln_y);
             self.velocity.push(state.speed.v);
@@ -150,13 +158,16 @@ impl Driven {
     }
 }
 
-/// The point (time, load) at `t` on the line from one to the other; the one where `t` is before it.
-fn between(from: (f64, f64), to: (f64, f64), t: f64) -> (f64, f64) {
-    if t <= from.0 {
+/// The point at `t` on the line from one to the other; the one where `t` is before it.
+fn between(from: LoadPoint, to: LoadPoint, t: f64) -> LoadPoint {
+    if t <= from.t {
         return from;
     }
-    let share = (t - from.0) / (to.0 - from.0);
-    (t, from.1 + share * (to.1 - from.1))
+    let share = (t - from.t) / (to.t - from.t);
+    LoadPoint {
+        t,
+        log_load: from.log_load + share * (to.log_load - from.log_load),
+    }
 }
 
 impl Friction {
@@ -220,7 +231,7 @@ impl Friction {
     }
 
     /// From node to node, the load going linearly; `None` where the velocity becomes infinite.
-    fn cross(&self, mut state: State, span: f64, (from, to): (f64, f64)) -> Option<State> {
+    fn cross(&self, mut state: State, span: f64, from: f64, to: f64) -> Option<State> {
         let per_day = (to - from) / span;
         let (mut t, mut steps) = (0.0, 0);
         while t < span {
