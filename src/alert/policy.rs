@@ -81,6 +81,16 @@ fn with_odds_times(chance: f64, factor: f64) -> f64 {
 }
 
 impl Policy {
+    /// Whether a forecast is judged otherwise than under `before`, whatever thresholds and rules say.
+    pub fn forecasts_otherwise(&self, before: &Self) -> bool {
+        let alike = Self {
+            thresholds: self.thresholds.clone(),
+            rules: self.rules.clone(),
+            ..before.clone()
+        };
+        alike != *self
+    }
+
     /// How far ahead red looks.
     pub fn red_within(&self) -> SignedDuration {
         let twice = self.evacuation_time.saturating_mul(EVACUATIONS_AHEAD);

@@ -12,6 +12,8 @@ use crate::reading::Quantity;
 
 /// A covariate follows the year if its harmonics hold this share of its variance.
 const SEASONAL_SHARE: f64 = 0.5;
+/// And one that is one wave of a year, by that wave alone.
+const ONE_WAVE_SHARE: f64 = 0.93;
 /// Times tried for what happens once.
 const EVENT_TIMES: usize = 64;
 /// So many of the largest innovations are tried beside them, of those that are so many times the median size or more.
@@ -134,26 +136,33 @@ pub(super) fn are_two_years(problem: &Problem) -> bool {
 
 /// Whether a covariate's response mostly repeats itself from year to year: a year's harmonics hold this share of it.
 pub(super) fn follows_season(problem: &Problem, term: &Term) -> bool {
+    let periods = Kind::SEASONAL.definition().wave_periods;
+    let share = || held_by(problem, term, periods);
+    are_two_years(problem) && share().is_some_and(|share| share > SEASONAL_SHARE)
+}
+
+/// Whether a covariate's response is one wave of a year, in a record that does not show whether that repeats.
+pub(super) fn is_one_wave(problem: &Problem, term: &Term) -> bool {
+    let year = &Kind::SEASONAL.definition().wave_periods[..1];
+    let share = || held_by(problem, term, year);
+    !are_two_years(problem) && share().is_some_and(|share| share > ONE_WAVE_SHARE)
+}
+
+/// What share of the course of a covariate in a term's load waves of these periods, days, hold; `None` of other terms.
+fn held_by(problem: &Problem, term: &Term, periods: &[f64]) -> Option<f64> {
     let (Act::Load(columns), Some(_)) = (&term.act, term.channel) else {
-        return false;
+        return None;
     };
-    if !are_two_years(problem) {
-        return false;
-    }
-    let Some(column) = columns.first() else {
-        return false;
-    };
+    let column = columns.first()?;
     // What a rate adds up to is the covariate itself.
     let course = match term.response.map(|response| response.form) {
         Some(Form::Rate) => standardise(slips(&problem.nodes, column)),
         Some(Form::Level) | None => Some(column.clone()),
     };
-    let Some(mut left) = course else {
-        return false;
-    };
+    let mut left = course?;
     let whole = dot(&left, &left);
     let mut directions: Vec<Vec<f64>> = Vec::new();
-    for harmonic in harmonics(&problem.nodes, Kind::SEASONAL.definition().wave_periods) {
+    for harmonic in harmonics(&problem.nodes, periods) {
         let mut unit = harmonic;
         for known in &directions {
             let share = dot(known, &unit);
@@ -171,7 +180,7 @@ pub(super) fn follows_season(problem: &Problem, term: &Term) -> bool {
             .for_each(|(l, u)| *l -= share * u);
         directions.push(unit);
     }
-    dot(&left, &left) < (1.0 - SEASONAL_SHARE) * whole
+    Some(1.0 - dot(&left, &left) / whole)
 }
 
 /// What of that kind happened once, before reading `at`, in each way that it may.

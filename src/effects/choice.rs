@@ -5,6 +5,7 @@ use super::companions::{go_together, is_rain};
 use super::definition::{LiesIn, Support};
 use super::judge::{block, jumps_at_once, named};
 use super::kind::Kind;
+use super::margin::{BY_SHAPE, SLOW_COURSE};
 use super::objection::{Judgement, Objection, ObjectionWeight};
 use super::prior::Prior;
 use super::refit::Fitted;
@@ -16,10 +17,9 @@ use super::slow::SlowFit;
 const MOST_OF_AN_INSTRUMENT_MM: f64 = 5.0;
 /// So many margins of the BIC a response with a long memory may gain more than waves by bending.
 const BENT: f64 = 3.0;
-/// A covariate with a memory of more than this share of the record, or that changes the log-load by less than this standard deviation, leads a slow load by so
+/// A covariate with a memory of more than [`SLOW_COURSE`], or that changes the log-load by less than this standard deviation, leads a slow load by so
 /// much of the margin: those of three drawn slopes that fail by a power law had memories of .30 and .39, or a load of .01, and led it by less; of five lakes
 /// that are drawn down once, with memories of at most .12, four did too.
-const SLOW_COURSE: f64 = 0.2;
 const HARDLY_ANYTHING: f64 = 0.05;
 const LEADS_A_SLOW_LOAD: f64 = 0.5;
 /// A load with this standard deviation hardly changes the velocity: by a tenth.
@@ -29,7 +29,7 @@ impl Search<'_> {
     /// The best effect that may be added to `base`, refitted with it; an event and the mean that it is seen through are
     /// added together.
     pub(super) fn one_more(&mut self, base: &Fitted, round: usize) -> Option<OneMore> {
-        (self.withheld, self.is_daily) = (None, false);
+        (self.withheld, self.is_daily, self.is_slow_alike) = (None, false, false);
         self.may_have_acted.clear();
         let mut refitted = self.refits(base, round)?;
         if let Some(found) = self.averaged(base, &refitted, round) {
@@ -60,7 +60,8 @@ impl Search<'_> {
         if chosen.is_none() {
             self.note_slip_alike(&refitted, &judged);
         }
-        let ties = chosen.map(|k| self.ties(&refitted, k, &judged));
+        let mut ties = chosen.map_or_else(Vec::new, |k| self.ties(&refitted, k, &judged));
+        ties.extend(self.is_slow_alike.then(|| Rival::from(Kind::UNEXPLAINED)));
         for (k, one) in refitted.iter().enumerate() {
             let (held, objection) = judged[k].clone();
             let reason = objection.map(|objection| objection.why);
@@ -82,7 +83,7 @@ impl Search<'_> {
         let how = Accepted {
             bic_gain: one.gain,
             p_value: one.p_value,
-            ties: ties.unwrap_or_default(),
+            ties,
         };
         let how = one.with_day(one.with_season(how, self.problem), self.problem);
         Some(OneMore::Effect(one.fitted, vec![how]))
@@ -93,6 +94,10 @@ impl Search<'_> {
     fn first_of(&self, refitted: &[Refitted], judged: &[Judgement]) -> Option<usize> {
         let first = judged.iter().position(|one| one.1.is_none())?;
         let best = &refitted[first];
+        let jump = self.jump_instead(best, refitted, judged);
+        if jump.is_some() {
+            return jump;
+        }
         if !best.term.kind.jumps() {
             return Some(first);
         }
@@ -107,6 +112,24 @@ impl Search<'_> {
             judged[*k].1.is_none() && is_near && one.term.kind.jumps()
         });
         rivals.max_by(|a, b| score(*a).total_cmp(&score(*b)))
+    }
+
+    /// A jump of the reading that may be accepted and that the readings can hardly tell from `best`, which nothing but their shape supports: in the end a
+    /// kind that can follow any bend stands only where it leaves nothing, and a jump that it had beaten would be lost with it.
+    fn jump_instead(
+        &self,
+        best: &Refitted,
+        refitted: &[Refitted],
+        judged: &[Judgement],
+    ) -> Option<usize> {
+        if !best.term.kind.fits_any_bend() || best.term.is_jump_of_reading() {
+            return None;
+        }
+        let margin = BY_SHAPE * self.options.bic_margin;
+        (0..refitted.len()).find(|k| {
+            let one = &refitted[*k];
+            judged[*k].1.is_none() && one.term.is_jump_of_reading() && one.gain > best.gain - margin
+        })
     }
 
     /// An event and the mean that it is seen through, where both together may be accepted.
@@ -172,6 +195,8 @@ impl Search<'_> {
                 )
             };
             self.note_slow(&slow, why);
+            self.is_slow_alike =
+                one.term.at.is_some() && slow.gain > one.gain - self.options.bic_margin;
             return None;
         }
         if more >= self.options.bic_margin

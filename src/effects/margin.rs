@@ -1,5 +1,6 @@
 //! What a candidate must gain before a later block is looked at.
 
+use super::candidates::is_one_wave;
 use super::definition::{Support, Trying};
 use super::judge::{may_be_slip, objection};
 use super::noise::Memory;
@@ -16,6 +17,13 @@ const BY_MEMORY: f64 = 2.5;
 /// covariates had nothing to do with them were put on one, at gains of 10 to 33, four of them with a memory of .39 to .50 of the record.
 const SLOW: f64 = 1.0 / 3.0;
 const BY_SLOW_RESPONSE: f64 = 4.0;
+/// One with a memory of more than this share must gain so many times the margin: of 13 false covariates of measured and drawn records six had such a
+/// memory and gained 14 to 25; 13 right ones with such a memory gained 33 to 468.
+pub(super) const SLOW_COURSE: f64 = 0.2;
+const BY_SLOW_COURSE: f64 = 2.5;
+/// A covariate that is one wave of a year, in a record that does not show that the year repeats, must gain so many times the margin: every other slow
+/// course looks like it. Six of ten false ones gained less, and none of 120 right ones.
+const BY_ONE_WAVE: f64 = 4.0;
 
 /// A covariate that gains as much from nothing in fewer of the cases is named beside what gains less.
 const NEARLY_SIGNIFICANT: f64 = 0.1;
@@ -74,6 +82,11 @@ impl Search<'_> {
         }
         if self.is_slower_than(one, SLOW) {
             times = times.max(BY_SLOW_RESPONSE);
+        } else if self.is_slower_than(one, SLOW_COURSE) {
+            times = times.max(BY_SLOW_COURSE);
+        }
+        if is_one_wave(self.problem, &one.term) {
+            times = times.max(BY_ONE_WAVE);
         }
         times * self.options.bic_margin
     }

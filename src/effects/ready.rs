@@ -57,6 +57,7 @@ impl Ready {
             withheld: None,
             may_have_acted: Vec::new(),
             is_daily: false,
+            is_slow_alike: false,
             null: None,
         }
     }

@@ -4,7 +4,9 @@ use super::act::Act;
 use super::candidates;
 use super::frame::Frames;
 use super::free_delay::SHORTEST;
-use super::fresh::{best_of_starts, fresh_laws, from_the_first_readings, under_growing_means};
+use super::fresh::{
+    best_of_starts, fresh_laws, fresh_starts, from_the_first_readings, under_growing_means,
+};
 use super::linear::Linear;
 use super::noise::{Noise, Whitener};
 use super::problem::Problem;
@@ -236,6 +238,9 @@ impl<'a> Search<'a> {
         let mut fitted = self.best_start(base, term)?;
         if base.bic(problem) - fitted.bic(problem) > 0.0 {
             self.sharpen(&mut fitted);
+            if is_event_beside(base, term) {
+                self.settle_delays(&mut fitted);
+            }
         }
         if matches!(term.act, Act::Friction(_)) {
             fitted = self.fewer_or_more(base, fitted);
@@ -269,6 +274,11 @@ impl<'a> Search<'a> {
         if base.terms.is_empty() {
             let grown = from_the_first_readings(problem, term, &mut self.scratch);
             levels.extend(grown.filter(|grown| grown.prediction.len() == problem.t.len()));
+        }
+        if is_event_beside(base, term) {
+            let joint: Vec<Term> = base.terms.iter().chain([term]).cloned().collect();
+            let fresh = fresh_starts(problem, &joint);
+            levels.extend(best_of_starts(problem, &fresh, &mut self.scratch));
         }
         levels.extend(under_growing_means(problem, base, term, &mut self.scratch));
         for size in term.act.starts() {
@@ -437,6 +447,12 @@ impl Refitted {
 }
 
 /// Whether a term makes one large innovation of the reading, or, where the noise remembers, of the velocity.
+/// Whether it is an event of the ground beside effects that were found without it: these have taken up what they could of it, by their sizes, their delays and
+/// the law.
+fn is_event_beside(base: &Fitted, term: &Term) -> bool {
+    !base.terms.is_empty() && term.kind.is_event_of_the_ground()
+}
+
 fn is_jump(term: &Term, frames: &Frames) -> bool {
     term.is_jump_of_reading() || (term.kind.jumps() && frames.remembers())
 }

@@ -16,9 +16,16 @@ pub struct Rival {
 }
 
 impl Rival {
-    /// Their names with commas between them.
+    /// Their names with commas between them, as people read them.
     pub fn listed(rivals: &[Self]) -> String {
-        let names: Vec<String> = rivals.iter().map(Self::to_string).collect();
+        let name = |rival: &Self| {
+            if rival.kind == Kind::UNEXPLAINED {
+                "a load that changes over a while and that nothing measures".to_owned()
+            } else {
+                rival.to_string()
+            }
+        };
+        let names: Vec<String> = rivals.iter().map(name).collect();
         names.join(", ")
     }
 }

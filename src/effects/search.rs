@@ -119,6 +119,8 @@ pub(super) struct Search<'a> {
     pub(super) withheld: Option<Withheld>,
     /// Whether a tide was refused in this round because a daily cycle explains the same.
     pub(super) is_daily: bool,
+    /// Whether the event found in this round cannot be separated from a load that changes over a while and that nothing measures.
+    pub(super) is_slow_alike: bool,
     /// Of what was refused in this round, what may have acted all the same: a slow load cannot be separated from it, or slip looks the same.
     pub(super) may_have_acted: Vec<Rival>,
     /// The law without any effect, by which all effects together are judged.

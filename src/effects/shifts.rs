@@ -82,6 +82,7 @@ impl Search<'_> {
             withheld: None,
             may_have_acted: Vec::new(),
             is_daily: false,
+            is_slow_alike: false,
             null: None,
         };
         let steady = other.steady_law(base);

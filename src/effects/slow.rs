@@ -19,7 +19,7 @@ const PLACES: usize = 24;
 const RAMPS: [f64; 5] = [0.08, 0.15, 0.25, 0.4, 0.6];
 const PULSES: [f64; 4] = [0.025, 0.05, 0.1, 0.2];
 /// What is shorter, as a share of the record or in readings, is an event, or not seen to be none.
-const SHORTEST_RAMP: (f64, f64) = (0.06, 8.0);
+const SHORTEST_RAMP: (f64, f64) = (0.03, 8.0);
 const SHORTEST_PULSE: (f64, f64) = (0.02, 3.0);
 /// By what factor the length, and by what share of it the place, is moved at once.
 const STRIDES: [f64; 3] = [0.5, 0.2, 0.07];

@@ -106,11 +106,13 @@ pub(super) fn conclude(
         cannot_separate_from.extend(daily::rivals());
     }
     let cannot_separate_from = separate(cannot_separate_from, &effects);
-    let is_one_channel = cannot_separate_from.iter().all(|one| one.channel.is_none());
+    // Another channel, or a load that nothing measures, would explain as much: what is found is not all that may have acted.
+    let is_other = |one: &Rival| one.channel.is_some() || one.kind == Kind::UNEXPLAINED;
+    let is_alone = !cannot_separate_from.iter().any(is_other);
     if remembers && !left {
         effects.push(correlated(ready.unit, &full, memory_gain));
     }
-    let explained = match (effects.is_empty(), left || !is_one_channel) {
+    let explained = match (effects.is_empty(), left || !is_alone) {
         (false, false) => Explained::Full,
         (false, true) => Explained::Partly,
         (true, _) => Explained::None,

@@ -12,6 +12,9 @@ use std::collections::BTreeSet;
 /// Refits that one [`super::Notice::BatchEnd`] makes at most of what queued.
 const MOST_REFITS: usize = 16;
 
+/// How a benchmark of a queue is judged.
+type JudgeTrack = fn(&mut Track, &Policy, &StepContext<'_>) -> Vec<Event>;
+
 /// What waits for the end of a batch, or for time to look back.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Batches {
@@ -104,12 +107,12 @@ impl Monitor {
 
     /// Judges the newest reading of the next benchmarks of the queue; when it was the last one, readings are judged as
     /// they come again.
-    fn judge_queued(&mut self, now: Timestamp) -> Vec<Event> {
+    fn judge_queued(&mut self, now: Timestamp, how: JudgeTrack) -> Vec<Event> {
         let (mut events, mut refits) = (Vec::new(), 0);
         while refits < MOST_REFITS
             && let Some(id) = self.batches.queue.waiting.pop_first()
         {
-            let judged = self.judged(&id, now, Track::judge_batch);
+            let judged = self.judged(&id, now, how);
             refits += count_refits(&judged);
             events.extend(judged);
         }
@@ -130,8 +133,16 @@ impl Monitor {
                 self.benchmarks.note_changed(&id);
             }
         }
-        events.extend(self.judge_queued(now));
+        events.extend(self.judge_queued(now, Track::judge_batch));
         events
+    }
+
+    /// As [`Monitor::end_batch`] while more of what came together is to be read: nothing is judged of which a part may be corrected.
+    pub(super) fn go_on_with_batch(&mut self, now: Timestamp) -> Vec<Event> {
+        if self.past.is_open() {
+            return Vec::new();
+        }
+        self.judge_queued(now, Track::judge_within_batch)
     }
 
     /// Looks into whether late readings of this benchmark would have called another level.

@@ -35,6 +35,8 @@ pub enum Notice {
     /// benchmarks whose readings queued.
     #[serde(rename = "settle")]
     BatchEnd,
+    /// More of what came together is still to be read: of what queued the benchmarks are judged of which nothing came late.
+    BatchGoesOn,
     /// Whether late readings of this benchmark would have called another level is looked into now.
     LookBack(BenchmarkId),
     /// The readings of a silent benchmark that come now were measured long before `time`, which it is: a backlog.
@@ -110,6 +112,7 @@ impl Monitor {
                 Vec::new()
             }
             Notice::BatchEnd => self.end_batch(now),
+            Notice::BatchGoesOn => self.go_on_with_batch(now),
             Notice::LookBack(benchmark) => self.look_back(now, benchmark),
             Notice::Behind { benchmark, time } => {
                 if let Some(track) = self.benchmarks.get_mut(benchmark) {

@@ -218,7 +218,7 @@ mod tests {
 
     /// What the map of a benchmark holds: that of the track before it had parts, with which states are on disks, and what was
     /// added since.
-    const NAMES: [&str; 30] = [
+    const NAMES: [&str; 31] = [
         "accepted",
         "adopted",
         "ahead",
@@ -231,6 +231,7 @@ mod tests {
         "intercept",
         "kept",
         "latch",
+        "late_run",
         "levels",
         "look",
         "lookback",

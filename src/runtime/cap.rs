@@ -228,9 +228,16 @@ fn short(text: &str) -> String {
     hex
 }
 
+/// The chain that a file holds. One that cannot be read as such is set aside, and a chain begins anew: an alert is written without
+/// references rather than not at all.
 fn read(file: &Path) -> io::Result<Vec<CapMessage>> {
     match fs::read(file) {
-        Ok(bytes) => Ok(serde_json::from_slice(&bytes)?),
+        Ok(bytes) => serde_json::from_slice(&bytes).or_else(|error| {
+            let aside = file.with_extension("damaged");
+            tracing::warn!(file = %file.display(), aside = %aside.display(), %error, "the messages to which a CAP message refers cannot be read: it is written without references");
+            fs::rename(file, aside)?;
+            Ok(Vec::new())
+        }),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
         Err(error) => Err(error),
     }

@@ -216,6 +216,7 @@ impl Daemon {
             self.commit_what_is_urgent()?;
         }
         self.positions.extend(batch.positions);
+        self.files_are_read = batch.caught_up;
         // Of a backlog one batch follows another, and time is not let pass.
         if self.since_orders.elapsed() >= TICK {
             self.take_orders()?;
@@ -229,13 +230,12 @@ impl Daemon {
         self.release()?;
         self.end_batch()?;
         if !batch.caught_up && self.may_commit_later() {
-            (self.files_are_read, self.is_up_to_date) = (false, false);
+            self.is_up_to_date = false;
             return Ok(());
         }
         self.commit()?;
         // Also while years of backlog come in: the state is not to hold all of their refits at once.
         self.thin()?;
-        self.files_are_read = batch.caught_up;
         self.note_up_to_date()
     }
 
@@ -337,7 +337,7 @@ impl Daemon {
     fn end_batch(&mut self) -> Result<(), StoreError> {
         loop {
             let stopwatch = Stopwatch::start();
-            let events = self.site.end_batch();
+            let events = self.site.end_batch(self.files_are_read);
             self.reporting.vitals.judged(&events, stopwatch.elapsed());
             if !self.site.queues() {
                 return Ok(());
@@ -362,6 +362,7 @@ impl Daemon {
         self.reporting.vitals.judged(&events, stopwatch.elapsed());
         if owed_past && !self.site.owes_past() {
             tracing::info!("the history before the first start has been judged");
+            self.site.save_memory();
         }
         self.commit()
     }

@@ -20,6 +20,7 @@ use crate::config::Config;
 use crate::reading::BenchmarkId;
 use crate::store::{Store, StoreError};
 use std::collections::BTreeSet;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use tokio::signal::unix::{SignalKind, signal};
@@ -81,10 +82,12 @@ pub async fn run(
         alerts: Some(dispatcher(config, &store, reporting.vitals.faults())),
         status: Status::Actual,
     };
-    let name = &config.site.name;
-    let mut turn = || reporting.turn();
-    let resume = || Site::resume(name, config.settings.clone(), sinks, &mut turn);
-    let site = tokio::task::block_in_place(resume).map_err(fail)?;
+    let resume = || resumed(config, sinks, &mut reporting, &shutdown);
+    let Some(site) = tokio::task::block_in_place(resume).map_err(fail)? else {
+        reporting.stop().await;
+        tracing::info!("stopped before all stored readings had been judged again");
+        return Ok(Counts::default());
+    };
     site.show(&reporting.vitals);
     reporting.vitals.retain(|benchmark| site.shows(benchmark));
     for (source, count) in store.quarantined().map_err(fail)? {
@@ -95,7 +98,7 @@ pub async fn run(
     let mut daemon = Daemon::new(config, store, site, sources, reporting, clock::now);
     daemon.beside = Some(beside);
     daemon.note_inherited(config).map_err(fail)?;
-    tracing::info!(site = name, state = %config.site.state_dir.display(), "started");
+    tracing::info!(site = config.site.name, state = %config.site.state_dir.display(), "started");
     let worked = daemon.work(shutdown, hangup, progress).await;
     let Daemon {
         site,
@@ -127,6 +130,24 @@ pub async fn run(
     worked.and(closed.map(drop)).map_err(fail)?;
     followed?;
     Ok(counts)
+}
+
+/// The site as its state has it; `None` where `shutdown` is asked for meanwhile.
+fn resumed(
+    config: &Config,
+    sinks: Sinks,
+    reporting: &mut Reporting,
+    shutdown: &Shutdown,
+) -> Result<Option<Site>, StoreError> {
+    let mut turn = || {
+        reporting.turn();
+        if shutdown.is_requested() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    Site::resume(&config.site.name, config.settings.clone(), sinks, &mut turn)
 }
 
 /// Shows how the benchmarks stood when the last events were written: until the steps since then are judged again nothing newer is

@@ -313,3 +313,25 @@ async fn the_end_of_what_another_level_has_replaced_cancels_nothing() {
     let cancel = written(folder.path(), &hook, &end).await.unwrap();
     assert!(cancel.contains("<msgType>Cancel</msgType>"), "{cancel}");
 }
+
+#[tokio::test]
+async fn a_chain_that_cannot_be_read_is_set_aside_and_the_alert_is_written() {
+    let (folder, hook) = folder();
+    let at = folder.path();
+    let real = |level| alert("5", level, (AlertState::Firing, Status::Actual));
+    written(at, &hook, &real(Level::Orange)).await.unwrap();
+    let chains = at.join("cap/chains");
+    for file in fs::read_dir(&chains).unwrap() {
+        fs::write(file.unwrap().path(), "").unwrap();
+    }
+    let red = written(at, &hook, &real(Level::Red)).await.unwrap();
+    assert_eq!(kind(&red), ("Alert".to_owned(), String::new()));
+    let names = fs::read_dir(&chains).unwrap();
+    let names: Vec<String> = names
+        .map(|file| file.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    assert!(
+        names.iter().any(|name| name.ends_with(".damaged")),
+        "{names:?}"
+    );
+}

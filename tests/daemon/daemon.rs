@@ -100,8 +100,9 @@ fn site(config: &Config) -> Site {
         &config.site.name,
         config.settings.clone(),
         sinks,
-        &mut || {},
+        &mut || std::ops::ControlFlow::Continue(()),
     )
+    .unwrap()
     .unwrap()
 }
 

@@ -35,6 +35,7 @@
 //! | 33 | the disk of the daemon's own record | `recorded` |
 //! | 34 | a state that an earlier version wrote | `upgrade` |
 //! | 35 | orders that people give while readings come late, or a red is called | `seen` |
+//! | 36 | exports that are issued again, in any order; what a reload changes of what is called | `exports` |
 //!
 //! docs/failure-modes.md says the same for operators.
 //!
@@ -60,6 +61,7 @@ mod disk;
 mod drill;
 mod duty;
 mod escalation;
+mod exports;
 mod feeds;
 mod files;
 mod killed;

@@ -186,7 +186,11 @@ impl Daemon {
             alerts: None,
             status: Status::Test,
         };
-        let site = Site::resume("Toc", config.settings.clone(), sinks, &mut || {}).unwrap();
+        let site = Site::resume("Toc", config.settings.clone(), sinks, &mut || {
+            std::ops::ControlFlow::Continue(())
+        })
+        .unwrap()
+        .unwrap();
         Self {
             follower,
             site,

@@ -81,6 +81,27 @@ fn a_first_start_judges_what_is_current_before_it_makes_the_refits_of_the_past_a
     site.proven_events();
 }
 
+/// As a power cut leaves it: what takes minutes to judge on a first start is not to keep the next start from reading.
+#[test]
+fn the_past_that_has_been_judged_is_not_judged_again_after_a_kill() {
+    let site = history();
+    let program = site.caught_up();
+    eventually("that it is judged", || {
+        site.log()
+            .contains("before the first start has been judged")
+    });
+    drop(program);
+    site.caught_up().stop();
+    let log = site.log();
+    let replayed = log
+        .lines()
+        .rfind(|line| line.contains("stored steps replayed"));
+    let (_, steps) = replayed.unwrap().split_once("steps=").unwrap();
+    let steps: usize = steps.split_once(' ').unwrap().0.parse().unwrap();
+    assert!(steps < 10, "{steps} steps: {log}");
+    site.proven_events();
+}
+
 fn site_newest(site: &Site) -> BTreeMap<String, String> {
     let newest = (0..BENCHMARKS).map(|benchmark| {
         let text = fs::read_to_string(site.path(&format!("incoming/{benchmark}.csv"))).unwrap();

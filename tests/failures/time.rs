@@ -293,3 +293,33 @@ fn a_silence_lasts_as_long_as_it_was_given_for_where_the_hosts_clock_is_days_ahe
     program.stop();
     site.proven_events();
 }
+
+/// As by a logger whose clock jumps once, or that stands in the hour after the end of summer time.
+#[test]
+fn one_reading_stamped_within_the_hour_keeps_no_honest_one_from_calling_red() {
+    let site = Site::new("[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"50 mm\"\n");
+    let creep: String = (1..60)
+        .rev()
+        .map(|row| {
+            let time = clock::now() - SignedDuration::from_mins(row);
+            format!("{time},{:.3}\n", 0.001 * (60 - row) as f64)
+        })
+        .collect();
+    site.append("incoming/5.csv", &format!("{HEADER}{creep}"));
+    let program = site.caught_up();
+    let ahead = clock::now() + SignedDuration::from_mins(50);
+    site.append("incoming/5.csv", &format!("{ahead},0.1\n"));
+    eventually("the one ahead", || site.values().len() == 60);
+    for reading in 0..4 {
+        let now = clock::now();
+        let line = format!("{now},{}\n", 60 + 40 * reading);
+        site.append("incoming/5.csv", &line);
+        eventually("it", || site.values().len() == 61 + reading);
+    }
+    eventually("the red", || site.notified("5/red/", "firing") == 1);
+    let status = site.printed(&["status", "--config", "site.toml"]);
+    assert!(status.contains("red"), "{status}");
+    program.stop();
+    let events = site.proven_events();
+    assert!(events.contains("leaps-ahead"), "{events}");
+}

@@ -95,7 +95,11 @@ impl<'a> Host<'a> {
             status: Status::Actual,
         };
         let settings = self.config.settings.clone();
-        let site = Site::resume(&self.config.site.name, settings, sinks, &mut || {}).unwrap();
+        let site = Site::resume(&self.config.site.name, settings, sinks, &mut || {
+            std::ops::ControlFlow::Continue(())
+        })
+        .unwrap()
+        .unwrap();
         let reporting = self
             .runtime
             .block_on(Reporting::start(

@@ -60,13 +60,17 @@ pub(super) fn parting(found: &Together) -> String {
 pub(super) fn others(explanation: &Explanation) -> Vec<String> {
     let mut said = Vec::new();
     let left = most_marked(&explanation.residual.structure);
-    let mut rivals = explanation.cannot_separate_from.iter();
-    let is_one_channel = rivals.all(|rival| rival.channel.is_none());
+    let rivals = || explanation.cannot_separate_from.iter();
+    let is_one_channel = rivals().all(|rival| rival.channel.is_none());
+    let is_slow_alike = rivals().any(|rival| rival.kind == Kind::UNEXPLAINED);
     if !explanation.verdict.effect.is_an_end() {
         said.push(match explanation.explained {
             Explained::Full => {
                 "Explained in full: the residual that is left passes for noise.".to_owned()
             }
+            Explained::Partly if is_slow_alike => format!(
+                "Explained in part: a load that nothing measures would explain as much{left}."
+            ),
             Explained::Partly if is_one_channel => {
                 format!("Explained in part: structure is left in the residual{left}.")
             }

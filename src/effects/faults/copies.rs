@@ -212,6 +212,8 @@ struct Following {
     total: f64,
     single: BTreeMap<u32, usize>,
     pairs: BTreeMap<(u32, u32), usize>,
+    /// How many different symbols follow each.
+    different: BTreeMap<u32, usize>,
 }
 
 impl Following {
@@ -220,21 +222,30 @@ impl Following {
         for pair in symbols.windows(2) {
             *pairs.entry((pair[0], pair[1])).or_insert(0) += 1;
         }
+        let mut different = BTreeMap::new();
+        for (before, _) in pairs.keys() {
+            *different.entry(*before).or_insert(0) += 1;
+        }
         Self {
             total: symbols.len() as f64,
             single: counted(symbols),
             pairs,
+            different,
         }
     }
 
-    /// Without the two occurrences that are the original and the copy themselves.
+    /// Without the two occurrences that are the original and the copy themselves. As much weight as the number of different symbols that follow goes to
+    /// those that did not follow yet (Witten and Bell 1991): after a dry day nearly every wet one is new, and none is surprising for that.
     fn information(&self, before: u32, after: u32) -> f64 {
         let besides =
             |count: Option<&usize>| count.map_or(0, |count| count.saturating_sub(2)) as f64;
         let general = besides(self.single.get(&after)).max(1.0) / self.total;
         let together = besides(self.pairs.get(&(before, after)));
         let alone = besides(self.single.get(&before));
-        -((together + BACKING * general) / (alone + BACKING))
+        let pair = self.pairs.get(&(before, after)).copied().unwrap_or(0);
+        let different = self.different.get(&before).copied().unwrap_or(0);
+        let different = different.saturating_sub(usize::from(pair <= 2)).max(1) as f64;
+        -((together + different * general) / (alone + different))
             .min(1.0)
             .ln()
     }

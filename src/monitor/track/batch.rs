@@ -30,6 +30,18 @@ impl Track {
         events
     }
 
+    /// As [`Track::judge_batch`] while more of what came together is to be read: nothing where some of it came late.
+    pub(in crate::monitor) fn judge_within_batch(
+        &mut self,
+        policy: &Policy,
+        context: &StepContext<'_>,
+    ) -> Vec<Event> {
+        if self.pending.has_unjudged_late() {
+            return Vec::new();
+        }
+        self.judge_batch(policy, context)
+    }
+
     /// Whether a reading of a queue is judged later: not where the first that was not lies an evacuation time back, unless
     /// what moved since then can call nothing that people act on.
     pub(super) fn waits(&mut self, policy: &Policy, time: Timestamp) -> bool {

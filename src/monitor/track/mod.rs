@@ -363,20 +363,26 @@ impl Track {
     }
 
     /// Goes by another policy from here on. A rule that the config has changed begins again, though it has the same name, and the newest
-    /// reading is judged by the thresholds as they are now.
+    /// reading is judged by the policy as it is now.
     pub(super) fn change_policy(
         &mut self,
         before: &Policy,
         now: &Policy,
         context: &StepContext<'_>,
-    ) -> Option<Event> {
+    ) -> Vec<Event> {
         self.alarm.forget_changed_rules(before, now);
-        let newest = self.record.newest()?;
+        let Some(newest) = self.record.newest() else {
+            return Vec::new();
+        };
         if context.phase.is_past || self.quality.is_stuck() {
-            return None;
+            return Vec::new();
+        }
+        if now.forecasts_otherwise(before) {
+            return self.judge(now, newest, context);
         }
         let beside = beside(&self.record, &self.forecaster, &self.quality);
-        (self.alarm).raise_by_change(beside, before, now, newest)
+        let raised = (self.alarm).raise_by_change(beside, before, now, newest);
+        raised.into_iter().collect()
     }
 
     pub(super) fn level(&self) -> Level {

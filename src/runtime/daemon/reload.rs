@@ -26,15 +26,18 @@ pub(super) fn read_by_hooks(config: &Config) -> u64 {
 }
 
 impl Daemon {
-    /// Waits for the hooks to finish. Were others notified of the same meanwhile, people would be notified twice.
-    async fn close_hooks(&mut self) {
+    /// Waits for the hooks to finish, but where the daemon is to end. Were others notified of the same meanwhile, people would be notified
+    /// twice.
+    async fn close_hooks(&mut self, shutdown: &Shutdown) {
         let Some(former) = self.site.unhook() else {
             return;
         };
         let mut closing = std::pin::pin!(former.close(DRAIN_LIMIT));
+        let mut shutdown = shutdown.clone();
         loop {
             tokio::select! {
                 _ = &mut closing => return,
+                () = shutdown.requested() => return,
                 // Bounded, so it is no way of keeping a daemon that stands still alive.
                 () = tokio::time::sleep(TICK) => self.reporting.turn(),
             }
@@ -149,7 +152,7 @@ impl Daemon {
         // Before they are set up: what changes meanwhile is seen at the next reload.
         let read = read_by_hooks(&fresh);
         if !self.keeps_hooks(&fresh, read) {
-            self.close_hooks().await;
+            self.close_hooks(shutdown).await;
             self.site.rehook(dispatcher(
                 &fresh,
                 &self.store,

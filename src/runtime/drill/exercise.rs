@@ -18,12 +18,13 @@ use crate::runtime::site::{Sinks, Site};
 use crate::runtime::sources::Sources;
 use crate::runtime::standing::every;
 use crate::store::{LeftOrder, Store};
+use anyhow::Context as _;
 use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write as _};
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -151,7 +152,9 @@ impl Exercise {
             status: Status::Exercise,
         };
         let name = &context.config.site.name;
-        let site = Site::resume(name, config.settings.clone(), sinks, &mut || {})?;
+        let mut goes_on = || ControlFlow::Continue(());
+        let site = Site::resume(name, config.settings.clone(), sinks, &mut goes_on)?;
+        let site = site.context("nothing breaks it off")?;
         let reporting = Reporting::inward();
         let sources = Sources::start(&config, &store, reporting.vitals.faults())?;
         let daemon = Daemon::new(&config, store, site, sources, reporting, clock::now);

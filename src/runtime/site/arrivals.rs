@@ -3,11 +3,12 @@
 use super::{BEFORE_ALL, MOST_UNWRITTEN, Site};
 use crate::monitor::{Event, Input, Notice};
 use crate::reading::{BenchmarkId, Timestamp, suspicion};
-use crate::runtime::clock;
+use crate::runtime::clock::{self, Stopwatch};
 use crate::runtime::tail::Arrival;
 use crate::runtime::workers::AllCores;
 use crate::store::{Presence, StoreError};
 use jiff::SignedDuration;
+use std::time::Duration;
 
 /// The first day of 1970, UTC: where a logger starts whose clock is not set. No reading of a site that is watched now
 /// was measured then; a replay of an archive takes it.
@@ -17,6 +18,8 @@ const CLOCKLESS: std::ops::Range<Timestamp> =
 const NEAR: SignedDuration = SignedDuration::from_hours(24);
 /// A reading that lies further behind is one of a backlog; how late that comes is noted again after this time.
 const NOTED_FOR: SignedDuration = SignedDuration::from_mins(30);
+/// For so long what came late waits at most until all that came with it has been read.
+const LONGEST_BATCH: Duration = Duration::from_secs(60);
 /// Calls of [`Site::judge_current`] before the first start counts as caught up; what is left is judged when nothing
 /// else waits.
 const MOST_JUDGED: usize = 8;
@@ -426,15 +429,30 @@ impl Site {
         self.monitor.clock_wrong().is_some()
     }
 
-    /// All that came together has been taken: judges what of it came late, once, and the next of what queued; to be
-    /// repeated while [`Site::queues`].
-    pub fn end_batch(&mut self) -> Vec<Event> {
-        let is_owed = self.monitor.late().is_some() || self.monitor.queues();
-        let Some(now) = self.now.filter(|_| is_owed) else {
+    /// A batch has been taken: judges what of it came late, once, and the next of what queued; to be repeated while [`Site::queues`]. Where it
+    /// is not the last of what came together, what came late waits, a minute at most: until all of a file that was issued
+    /// again has been read, its record is half as it was and half corrected.
+    pub fn end_batch(&mut self, is_last: bool) -> Vec<Event> {
+        let (comes_late, queues) = (self.monitor.late().is_some(), self.monitor.queues());
+        let Some(now) = self.now.filter(|_| comes_late || queues) else {
             return Vec::new();
         };
+        let waits = comes_late && !is_last && {
+            let since = self.batch_goes_on.get_or_insert_with(Stopwatch::start);
+            since.elapsed() < LONGEST_BATCH
+        };
+        if !waits {
+            self.batch_goes_on = None;
+        } else if !queues {
+            return Vec::new();
+        }
         self.monitor.prepare_queued(&AllCores);
-        let events = self.step(now, &Input::Notice(Notice::BatchEnd));
+        let notice = if waits {
+            Notice::BatchGoesOn
+        } else {
+            Notice::BatchEnd
+        };
+        let events = self.step(now, &Input::Notice(notice));
         for job in self.monitor.searches() {
             self.searches.start(job);
         }
@@ -448,7 +466,8 @@ impl Site {
 
     /// Whether something is still to be looked back on: what came late, or the past before a first start.
     pub fn owes_look_back(&self) -> bool {
-        self.monitor.late().is_some() || self.owes_past()
+        let is_late = self.monitor.late().is_some() && self.batch_goes_on.is_none();
+        is_late || self.owes_past()
     }
 
     /// Whether the past before a first start has been read and is still to be judged.

@@ -8,7 +8,8 @@ use super::{
 };
 use crate::alert::Level;
 use crate::monitor::{
-    AlertState, EventKind, Input, MemoryPart, Monitor, SavedError, SearchJob, Settings, from_bytes,
+    AlertState, EventKind, Input, MemoryPart, Monitor, Notice, SavedError, SearchJob, Settings,
+    from_bytes,
 };
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::delivered::delivery;
@@ -18,7 +19,11 @@ use crate::runtime::vitals::Vitals;
 use crate::store::{Delivery, DeliveryOutcome, Recorded, Store, StoreError};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
 use std::sync::Arc;
+
+/// Taking a piece of the past again, of sixteen refits, takes as long as so many readings.
+const STEPS_A_PIECE_OF_PAST: usize = 50;
 
 /// What the site remembers beside the monitor.
 #[derive(Debug, Serialize, Deserialize)]
@@ -40,7 +45,7 @@ struct SiteMemory {
 
 impl Site {
     /// The site as its state has it: as if it had never stopped, but for settings that are others now. `turn` is called
-    /// now and then on the way.
+    /// now and then on the way, and may break it off: `None` then, and nothing has changed.
     ///
     /// # Errors
     /// When the state cannot be read.
@@ -48,10 +53,10 @@ impl Site {
         name: &str,
         settings: Settings,
         sinks: Sinks,
-        turn: &mut dyn FnMut(),
-    ) -> Result<Self, StoreError> {
+        turn: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Option<Self>, StoreError> {
         let Some(store) = sinks.store.clone() else {
-            return Ok(Self::new(name, settings, sinks));
+            return Ok(Some(Self::new(name, settings, sinks)));
         };
         let mut site = Self::new(name, Settings::default(), sinks);
         let recorded = store.memory()?;
@@ -64,7 +69,9 @@ impl Site {
         }
         // What was sent, or called off, stands in the outbox.
         let alerts = site.sinks.alerts.take();
-        site.catch_up(&store, step, turn)?;
+        if site.catch_up(&store, step, turn)?.is_break() {
+            return Ok(None);
+        }
         site.sinks.alerts = alerts;
         site.recall_floods(&store)?;
         // What people ordered meanwhile: no hook is to be tried first with what they have acknowledged, silenced or ended.
@@ -76,7 +83,7 @@ impl Site {
             site.change_settings(settings);
         }
         site.begin();
-        Ok(site)
+        Ok(Some(site))
     }
 
     /// Shows how the benchmarks stand.
@@ -132,15 +139,17 @@ impl Site {
         &mut self,
         store: &Arc<Store>,
         mut after: i64,
-        turn: &mut dyn FnMut(),
-    ) -> Result<(), StoreError> {
+        turn: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<ControlFlow<()>, StoreError> {
         let from = after;
         loop {
             let rows = store.steps(after)?;
             let Some(last) = rows.last() else { break };
             after = last.seq;
             for row in &rows {
-                turn();
+                if turn().is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
                 if let Input::Found(finding) = &row.input {
                     self.searches.forget(&finding.benchmark);
                 }
@@ -155,7 +164,7 @@ impl Site {
                 for job in self.monitor.searches() {
                     self.searches.note(job);
                 }
-                self.steps_since_memory += 1;
+                self.note_step(&row.input);
                 // Before the next step: it may be an order that concerns them.
                 self.stand_again(store)?;
             }
@@ -163,7 +172,21 @@ impl Site {
         tracing::info!(steps = after - from, of = after, "stored steps replayed");
         self.settings = self.monitor.settings().clone();
         self.searches.resume();
-        Ok(())
+        Ok(ControlFlow::Continue(()))
+    }
+
+    /// One more step that a restart would take again. One that judges a piece of the past takes as long as many readings.
+    pub(super) fn note_step(&mut self, input: &Input) {
+        let weight = match input {
+            Input::Notice(Notice::Retrace | Notice::Current) => STEPS_A_PIECE_OF_PAST,
+            _ => 1,
+        };
+        self.steps_since_memory = self.steps_since_memory.saturating_add(weight);
+    }
+
+    /// The memory is saved with the next commit: a restart is not to judge again what has been judged.
+    pub fn save_memory(&mut self) {
+        self.steps_since_memory = usize::MAX;
     }
 
     /// What a step led to that is taken again.

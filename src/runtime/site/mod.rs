@@ -33,6 +33,7 @@ use waiting::WaitingReadings;
 
 use crate::monitor::{Event, EventKind, Input, Monitor, Notice, RESET_FOUND, SUSPECT, Settings};
 use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
+use crate::runtime::clock::Stopwatch;
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
 use crate::runtime::searches::Searches;
@@ -121,6 +122,8 @@ pub struct Site {
     returned: Returned,
     /// Messages that come so fast that the past is not over yet.
     crowd: MessageRush,
+    /// Runs since something came late of which more may come in the next batch.
+    batch_goes_on: Option<Stopwatch>,
 }
 
 impl Site {
@@ -148,6 +151,7 @@ impl Site {
             waiting: WaitingReadings::default(),
             returned: Returned::default(),
             crowd: MessageRush::default(),
+            batch_goes_on: None,
         }
     }
 
@@ -277,7 +281,7 @@ impl Site {
         if self.sinks.store.is_some() {
             self.batch.step(now, input, &events);
             log_suspicions(&events);
-            self.steps_since_memory += 1;
+            self.note_step(input);
         }
         events
     }
@@ -361,7 +365,7 @@ impl Site {
         host_time: Timestamp,
         limit: Duration,
     ) -> Result<Option<usize>, StoreError> {
-        self.steps_since_memory = usize::MAX;
+        self.save_memory();
         let recorded = self.commit(host_time);
         let lost = match self.sinks.alerts.take() {
             Some(alerts) => alerts.close(limit).await,

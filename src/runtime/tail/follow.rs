@@ -199,6 +199,8 @@ impl Follower {
             file.refill();
             self.heads.extend(head(key, file));
         }
+        // A table may stand with its newest row on top: read again after a correction of all rows, it would be judged by that one alone.
+        direct.sort_by(|one, other| one.rank().cmp(&other.rank()));
         arrivals.extend(merged(self.release(host_time), direct));
         let is_due = |source: &Followed| source.reorder.as_ref().is_some_and(Reorder::is_due);
         let caught_up = self.heads.is_empty()

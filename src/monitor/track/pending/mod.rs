@@ -52,6 +52,11 @@ impl Pending {
         self.has_unjudged_late = true;
     }
 
+    /// Whether something came late that has not been judged.
+    pub(super) fn has_unjudged_late(&self) -> bool {
+        self.has_unjudged_late
+    }
+
     /// A reading of `time` is judged later, with those of a queue.
     pub(super) fn queue(&mut self, time: Timestamp) {
         self.queued_since.get_or_insert(time);

@@ -12,8 +12,9 @@ use serde::{Deserialize, Serialize};
 const CONTRADICTED: u32 = 3;
 /// The newest reading waits where it lies further than this after the last of as many that have come since; a little out of order is usual.
 const OVERTAKEN: SignedDuration = SignedDuration::from_mins(10);
-/// It is taken after all where its value lies among so many of the newest, or no farther from them than they range over.
+/// It is taken after all where its value lies among so many of the newest and the one after it, or off them by this share of what the former range over.
 const LIKE: usize = 8;
+const OFF: f64 = 0.25;
 
 /// The reading that waits.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -141,13 +142,13 @@ impl BenchmarkRecord {
         };
         let value = self.history.value_of(own, &ahead.reading);
         let recent = self.history.values_as_read(ahead.unit, LIKE);
-        let beside = || {
-            let newest = self.history.value_of(source, reading);
-            recent.iter().copied().chain([newest])
-        };
-        let low = beside().fold(f64::INFINITY, f64::min);
-        let high = beside().fold(f64::NEG_INFINITY, f64::max);
-        let is_like = (low - (high - low)..=high + (high - low)).contains(&value);
+        let newest = self.history.value_of(source, reading);
+        let bounds = |(low, high): (f64, f64), value: &f64| (low.min(*value), high.max(*value));
+        let (low, high) = recent
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), bounds);
+        let off = OFF * (high - low);
+        let is_like = (low.min(newest) - off..=high.max(newest) + off).contains(&value);
         let is_wrong = ahead.was_newest && reading.time >= ahead.reading.time && !is_like;
         let wrong = self.ahead.take_if(|_| is_wrong)?;
         let text = format!(
@@ -264,7 +265,7 @@ mod tests {
 
         let mut wrong = overtaken([50.0, 60.0, 70.0]);
         for hour in 6..14 {
-            wrong.take(DISPLACEMENT, &reading(hour, 20.0 + 10.0 * f64::from(hour)));
+            wrong.take(DISPLACEMENT, &reading(hour, 20.0 + 10.0 * hour as f64));
             wrong.note_newest(at(hour));
         }
         let before = reading(14, 400.0);

@@ -94,6 +94,8 @@ impl BenchmarkRecord {
     ) -> Option<Redeclared> {
         self.declared.replace(declared)?;
         let is_sorted_out = self.history.sort_out(&self.declared);
+        // Readings that count again may be newer than those that did.
+        self.newest = self.newest.max(self.history.newest());
         let time = self.newest?;
         let events = self.reset(time);
         Some(Redeclared {

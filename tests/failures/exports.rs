@@ -1,0 +1,114 @@
+//! Exports that are issued again, whole and in any order, and what a reload changes of what is called.
+
+use crate::reread::{FAR, HEADER, POLICY, THRESHOLD, benchmark, reload, rows_of};
+use crate::site::{Site, eventually};
+use crate::telling::failing;
+use jiff::SignedDuration;
+use slipwatch::runtime::clock;
+use std::fs;
+
+/// An export of so many hourly rows of slow creep.
+fn export(rows: i32, zero: f64, is_newest_first: bool) -> String {
+    let rows = rows_of(rows, |row| zero + 0.01 * f64::from(row));
+    let mut lines: Vec<&str> = rows.lines().collect();
+    if is_newest_first {
+        lines.reverse();
+    }
+    format!("{HEADER}{}\n", lines.join("\n"))
+}
+
+/// The file of `b` is replaced by one that holds `text`, of so many rows.
+fn replaced(site: &Site, text: &str, rows: usize) {
+    site.append("new", text);
+    let known = site.values().len();
+    fs::rename(site.path("new"), site.path("incoming/b.csv")).unwrap();
+    eventually("them anew", || site.values().len() >= known + rows);
+}
+
+fn watched(more: &str) -> Site {
+    Site::new(&format!("{}{POLICY}{more}", benchmark("b", "")))
+}
+
+#[test]
+fn an_export_that_is_issued_again_with_another_zero_calls_no_red() {
+    // Also one that is read in several pieces, and one with its newest row on top.
+    for (rows, is_newest_first) in [(100, false), (700, false), (200, true)] {
+        let site = watched(FAR);
+        let count = usize::try_from(rows).unwrap();
+        site.append("incoming/b.csv", &export(rows, 100.0, is_newest_first));
+        let program = site.caught_up();
+        eventually("the readings", || site.values().len() >= count);
+        for zero in [20.0, 180.0] {
+            replaced(&site, &export(rows, zero, is_newest_first), count);
+        }
+        let more = format!("{},180.5\n", clock::now());
+        if !is_newest_first {
+            site.append("incoming/b.csv", &more);
+            eventually("one more", || site.values().len() >= 3 * count + 1);
+        }
+        program.stop();
+        assert_eq!(site.notified("b/red/", ""), 0, "{rows}: {}", site.events());
+        site.proven_events();
+    }
+}
+
+#[test]
+fn an_upload_with_its_newest_row_on_top_calls_what_is_due_in_its_middle() {
+    let site = watched(THRESHOLD);
+    // Fast for a day, and slow again.
+    let rows = rows_of(110, |row| {
+        0.01 * f64::from(row) + 4.0 * f64::from((row - 65).clamp(0, 24))
+    });
+    let rows: Vec<&str> = rows.lines().rev().collect();
+    let newest_first = |rows: &[&str]| format!("{HEADER}{}\n", rows.join("\n"));
+    site.append("incoming/b.csv", &newest_first(&rows[50..]));
+    let program = site.caught_up();
+    eventually("the readings", || site.values().len() >= 60);
+    replaced(&site, &newest_first(&rows), 50);
+    eventually("the red", || site.notified("b/red/", "firing") == 1);
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
+fn a_critical_velocity_that_is_lowered_is_judged_at_once() {
+    let limit = |text: &str| format!("critical_velocity = \"{text}\"\n");
+    let site = Site::new(&format!("{POLICY}{}", limit("5 m/day")));
+    let rows = rows_of(60, |row| 10.0 * f64::from(row));
+    site.append("incoming/5.csv", &format!("time,displacement_mm\n{rows}"));
+    let program = site.caught_up();
+    eventually("the readings", || site.values().len() == 60);
+    assert_eq!(site.notified("5/red/", ""), 0, "{}", site.events());
+    reload(&site, &program, &format!("{POLICY}{}", limit("0.1 m/day")));
+    eventually("the red", || site.notified("5/red/", "firing") == 1);
+    program.stop();
+    site.proven_events();
+}
+
+/// A red of readings within maintenance that is withdrawn is dated by these, and not by the one before it.
+#[test]
+fn a_red_that_withdrawn_maintenance_had_hidden_has_the_time_of_its_reading() {
+    let hours = |count: i64| clock::now() + SignedDuration::from_hours(count);
+    let maintenance = format!(
+        "[[event]]\nkind = \"maintenance\"\ntime = \"{}\"\nuntil = \"{}\"\n",
+        hours(-20),
+        hours(1)
+    );
+    let site = watched(&format!("{FAR}{maintenance}"));
+    let rows = rows_of(60, |row| {
+        0.01 * f64::from(row) + if row > 50 { 100.0 } else { 0.0 }
+    });
+    site.append("incoming/b.csv", &format!("{HEADER}{rows}"));
+    let program = site.caught_up();
+    eventually("the readings", || site.values().len() >= 60);
+    assert_eq!(site.notified("b/red/", ""), 0);
+    let without = format!("{}{POLICY}{FAR}", benchmark("b", ""));
+    reload(&site, &program, &without);
+    let newest = failing(113..114);
+    let (newest, _) = newest.split_once(',').unwrap();
+    eventually("the red", || {
+        site.notified(&format!("b/red/{newest}"), "firing") == 1
+    });
+    program.stop();
+    site.proven_events();
+}
