@@ -360,11 +360,15 @@ impl Daemon {
         let (stopwatch, owed_past) = (Stopwatch::start(), self.site.owes_past());
         let events = self.site.look_back();
         self.reporting.vitals.judged(&events, stopwatch.elapsed());
-        if owed_past && !self.site.owes_past() {
-            tracing::info!("the history before the first start has been judged");
+        let is_judged = owed_past && !self.site.owes_past();
+        if is_judged {
             self.site.save_memory();
         }
-        self.commit()
+        self.commit()?;
+        if is_judged {
+            tracing::info!("the history before the first start has been judged");
+        }
+        Ok(())
     }
 
     fn take(&mut self, arrival: &Arrival) -> Result<(), StoreError> {

@@ -54,17 +54,31 @@ fn an_export_that_is_issued_again_with_another_zero_calls_no_red() {
 
 #[test]
 fn an_upload_with_its_newest_row_on_top_calls_what_is_due_in_its_middle() {
-    let site = watched(THRESHOLD);
-    // Fast for a day, and slow again.
-    let rows = rows_of(110, |row| {
-        0.01 * f64::from(row) + 4.0 * f64::from((row - 65).clamp(0, 24))
-    });
-    let rows: Vec<&str> = rows.lines().rev().collect();
-    let newest_first = |rows: &[&str]| format!("{HEADER}{}\n", rows.join("\n"));
-    site.append("incoming/b.csv", &newest_first(&rows[50..]));
+    let site = Site::new(&format!(
+        "{}[alert]\nevacuation_time = \"24h\"\n{THRESHOLD}",
+        benchmark("b", "")
+    ));
+    // Each ten minutes; fast for five hours, and slow again for less than an evacuation time: in order of time it is red at the end.
+    let now = clock::now();
+    let mut moved = 0.0;
+    let rows: Vec<String> = (0..544)
+        .map(|row| {
+            moved += if (460..490).contains(&row) { 60.0 } else { 1.0 } / 144.0;
+            let time = now - SignedDuration::from_mins(10 * (543 - row));
+            format!("{time},{:.3}", moved + (row * 37 % 11) as f64 / 1000.0)
+        })
+        .collect();
+    let newest_first = |rows: &[String]| {
+        let rows: Vec<&str> = rows.iter().rev().map(String::as_str).collect();
+        format!("{HEADER}{}\n", rows.join("\n"))
+    };
+    site.append("incoming/b.csv", &newest_first(&rows[..400]));
     let program = site.caught_up();
-    eventually("the readings", || site.values().len() >= 60);
-    replaced(&site, &newest_first(&rows), 50);
+    eventually("that the past is judged", || {
+        site.log()
+            .contains("before the first start has been judged")
+    });
+    replaced(&site, &newest_first(&rows), 144);
     eventually("the red", || site.notified("b/red/", "firing") == 1);
     program.stop();
     site.proven_events();
@@ -74,10 +88,16 @@ fn an_upload_with_its_newest_row_on_top_calls_what_is_due_in_its_middle() {
 fn a_critical_velocity_that_is_lowered_is_judged_at_once() {
     let limit = |text: &str| format!("critical_velocity = \"{text}\"\n");
     let site = Site::new(&format!("{POLICY}{}", limit("5 m/day")));
-    let rows = rows_of(60, |row| 10.0 * f64::from(row));
+    let rows = rows_of(200, |row| {
+        8.0 * f64::from(row) + f64::from(row * 37 % 11) / 10.0
+    });
     site.append("incoming/5.csv", &format!("time,displacement_mm\n{rows}"));
     let program = site.caught_up();
-    eventually("the readings", || site.values().len() == 60);
+    eventually("that the past is judged", || {
+        site.log()
+            .contains("before the first start has been judged")
+    });
+    assert_eq!(site.values().len(), 200);
     assert_eq!(site.notified("5/red/", ""), 0, "{}", site.events());
     reload(&site, &program, &format!("{POLICY}{}", limit("0.1 m/day")));
     eventually("the red", || site.notified("5/red/", "firing") == 1);
