@@ -14,9 +14,6 @@ pub(super) const MOST_READINGS: usize = 3000;
 const NODES: f64 = 1500.0;
 /// No more nodes than this between two readings, where they stand evenly: a response smooths what is finer.
 const NODES_A_READING: f64 = 4.0;
-/// Of so many readings or fewer the law is solved on as many nodes as channels may ask for: what is found of them is not to depend on how fine a
-/// channel is that has nothing to do with it.
-const FEW_READINGS: usize = 90;
 /// Of the largest reading.
 const FINEST: f64 = 1e-9;
 /// Share of the usual velocity under which a load has no hold on the noise: there the readings give no velocity.
@@ -217,7 +214,6 @@ fn channel_spacing(channel: &Channel) -> Option<f64> {
 fn nodes(t: &[f64], averaging_days: f64, fine: f64) -> (Vec<f64>, Vec<usize>) {
     let span = t[t.len() - 1] - t[0];
     let usual = upper_median(t.windows(2).map(|pair| pair[1] - pair[0]).collect());
-    let fine = if t.len() > FEW_READINGS { fine } else { 0.0 };
     let step = fine.max(span / NODES).max(usual / NODES_A_READING);
     let (mut nodes, mut node_of) = (Vec::new(), Vec::new());
     if averaging_days > 0.0 {
