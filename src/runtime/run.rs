@@ -118,6 +118,14 @@ pub async fn run(
     if let Some(record) = record {
         record.close(DRAIN_LIMIT).await;
     }
+    log_counts(&counts);
+    let followed = sources.join().await;
+    worked.and(closed.map(drop)).map_err(fail)?;
+    followed?;
+    Ok(counts)
+}
+
+fn log_counts(counts: &Counts) {
     tracing::info!(
         taken = counts.taken,
         repeated = counts.repeated,
@@ -126,10 +134,6 @@ pub async fn run(
         long_past = counts.long_past,
         "stopped"
     );
-    let followed = sources.join().await;
-    worked.and(closed.map(drop)).map_err(fail)?;
-    followed?;
-    Ok(counts)
 }
 
 /// The site as its state has it; `None` where `shutdown` is asked for meanwhile.

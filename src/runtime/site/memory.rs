@@ -177,9 +177,11 @@ impl Site {
 
     /// One more step that a restart would take again. One that judges a piece of the past takes as long as many readings.
     pub(super) fn note_step(&mut self, input: &Input) {
-        let weight = match input {
-            Input::Notice(Notice::Retrace | Notice::Current) => STEPS_A_PIECE_OF_PAST,
-            _ => 1,
+        let judges_past = matches!(input, Input::Notice(Notice::Retrace | Notice::Current));
+        let weight = if judges_past {
+            STEPS_A_PIECE_OF_PAST
+        } else {
+            1
         };
         self.steps_since_memory = self.steps_since_memory.saturating_add(weight);
     }
