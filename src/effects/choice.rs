@@ -163,6 +163,7 @@ impl Search<'_> {
         one: &Refitted,
         most: f64,
     ) -> Option<(OneMore, String)> {
+        self.is_slow_alike = false;
         if !one.term.kind.definition().may_be_a_slow_load {
             return None;
         }

@@ -32,7 +32,8 @@ pub struct Explanation {
     /// What was declared to be there, each with its judgement; missing where nothing was.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub given: Vec<DeclaredEffect>,
-    /// What explains the same within the margin: kinds, with the channel where there is one.
+    /// What explains the same within the margin: kinds, with the channel where there is one; `unexplained` is a load that changes over a while and
+    /// that nothing measures.
     pub cannot_separate_from: Vec<Rival>,
     /// What is wrong with the data themselves.
     pub faults: Vec<Fault>,
