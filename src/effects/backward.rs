@@ -5,7 +5,7 @@ use super::judge::named;
 use super::problem::Problem;
 use super::refit::{Fitted, Start, likeliest, refit, towards, under_likeliest};
 use super::search::{Accepted, Search};
-use super::term::{Term, law_parameters, time_of};
+use super::term::{Term, coefficients_of, time_of};
 
 /// Steps towards the fit without a term, after which it is needed if the BIC is still higher by so many margins.
 const FIRST_STEPS: usize = 5;
@@ -86,10 +86,9 @@ impl Search<'_> {
 /// `full` without the term of that index and its coefficients.
 pub(super) fn start_without(problem: &Problem, full: &Fitted, index: usize) -> Start {
     let mut start = Start::at(full);
-    let earlier = full.terms[..index].iter().map(Term::coefficients);
-    let first = law_parameters(problem) + earlier.sum::<usize>();
-    let own = first..first + full.terms[index].coefficients();
-    start.parameters.drain(own);
+    start
+        .parameters
+        .drain(coefficients_of(problem, &full.terms, index));
     start.terms.remove(index);
     start
 }

@@ -2,6 +2,7 @@
 //! the law misses the readings by more than 90 % of the cases in which that is its gain.
 
 use super::act::Act;
+use super::backward::start_without;
 use super::candidates::with_response;
 use super::judge::coefficients;
 use super::noise::Whitener;
@@ -61,13 +62,11 @@ pub(super) fn interval(
 /// `full` as a start, the term of that index the last, its coefficient held; `None` where it has several.
 fn with_last(ready: &Ready, full: &Fitted, index: usize) -> Option<Start> {
     let problem = &ready.problem;
-    let mut start = Start::at(full);
-    let place = coefficients_of(problem, &full.terms, index).start;
-    let term = start.terms.remove(index);
-    let gain = start.parameters.remove(place);
-    if term.coefficients() != 1 {
+    let term = full.terms[index].clone();
+    let [gain] = *coefficients(problem, full, index) else {
         return None;
-    }
+    };
+    let mut start = start_without(problem, full, index);
     if let Some(before) = what_gathered_before(ready, &term) {
         start = start.with_size(&before, 0.0);
     }

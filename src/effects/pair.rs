@@ -10,9 +10,9 @@ use super::search::{Accepted, OneMore, Refitted, Search};
 const MOST_SECOND: usize = 2;
 
 impl Search<'_> {
-    /// Where nothing else may be accepted that anything but the shape of the readings supports, the effect that gains most of those that their later block alone speaks against, with a second
-    /// one beside it: `None` where both together may not be accepted either, and where an effect was found already: what is left of
-    /// the law's drift would be credited to two more.
+    /// Where nothing may be accepted that more than the shape of the readings supports, the effect that gains most of those that their later
+    /// block alone speaks against, with a second one beside it: `None` where both together may not be accepted either, and where an
+    /// effect was found already: what is left of the law's drift would be credited to two more.
     pub(super) fn two_together(
         &mut self,
         base: &Fitted,
@@ -21,17 +21,17 @@ impl Search<'_> {
         round: usize,
     ) -> Option<OneMore> {
         let each = || refitted.iter().zip(judged);
-        let open = || each().filter(|(_, (_, reason))| reason.is_none());
-        let is_beaten = |one: &Refitted| self.is_beaten_by_its_other_form(one, refitted, judged);
+        let open = each().filter(|(_, (_, reason))| reason.is_none());
+        let open = open.map(|(one, _)| one);
+        let is_beaten = |one: &&Refitted| self.is_beaten_by_its_other_form(one, refitted, judged);
+        let standing: Vec<&Refitted> = open.filter(|one| !is_beaten(one)).collect();
         // What nothing but the shape of the readings supports may be what two effects look like.
-        let stands = |one: &Refitted| one.term.kind.has_independent_evidence() && !is_beaten(one);
-        if !base.terms.is_empty() || open().any(|(one, _)| stands(one)) {
+        let has_evidence = |one: &&Refitted| one.term.kind.has_independent_evidence();
+        if !base.terms.is_empty() || standing.iter().any(has_evidence) {
             return None;
         }
-        let by_shape = open()
-            .filter(|(one, _)| !is_beaten(one))
-            .map(|(one, _)| one.gain);
-        let by_shape = by_shape.fold(f64::NEG_INFINITY, f64::max) + self.options.bic_margin;
+        let gains = standing.iter().map(|one| one.gain);
+        let by_shape = gains.fold(f64::NEG_INFINITY, f64::max) + self.options.bic_margin;
         let refused = each().filter(|(_, (held, reason))| held.is_some() && reason.is_some());
         let (first, _) = refused.max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))?;
         let mut beside = self.refits(&first.fitted, round)?;

@@ -212,6 +212,13 @@ impl History {
         }
     }
 
+    /// The reading as it is kept.
+    fn as_kept(&self, source: MeasuredAs, reading: &Reading) -> Observation {
+        let mut own = self.observation(source, reading);
+        own.value -= self.taken_off(own.t_days);
+        own
+    }
+
     /// Days since the epoch.
     pub(super) fn days(&self, time: Timestamp) -> f64 {
         days_since(self.epoch, time)
@@ -230,14 +237,9 @@ impl History {
 
     /// Takes out the only reading, in the science's unit; the record begins at `epoch` from here on.
     pub(super) fn begin_again(&mut self, source: MeasuredAs, epoch: Timestamp) -> Option<Reading> {
-        let only = self.observations.values.pop()?;
-        let time = self.time(only.t_days)?;
+        let only = self.take_out_newest()?;
         *self = Self::new(source, epoch);
-        Some(Reading {
-            time,
-            value: only.value,
-            sigma: only.sigma,
-        })
+        Some(only)
     }
 
     /// Takes out the newest reading: as it was read, in the science's unit.
@@ -252,8 +254,7 @@ impl History {
 
     /// The value of a reading, in the science's unit, as the record would have it.
     pub(super) fn value_of(&self, source: MeasuredAs, reading: &Reading) -> f64 {
-        let own = self.observation(source, reading);
-        own.value - self.taken_off(own.t_days)
+        self.as_kept(source, reading).value
     }
 
     /// When the newest reading was taken.
@@ -384,9 +385,8 @@ impl History {
     /// Whether a reading has the value of the newest one, or one of a sensor that stands at the end of its range, and
     /// comes after it.
     pub(super) fn is_repeated_by(&self, source: MeasuredAs, reading: &Reading) -> bool {
-        let mut new = self.observation(source, reading);
-        new.value -= self.taken_off(new.t_days);
-        source.unit.quantity() == self.observations.quantity && self.repeats(&new)
+        let is_ours = source.unit.quantity() == self.observations.quantity;
+        is_ours && self.repeats(&self.as_kept(source, reading))
     }
 
     /// The velocities that the readings show.

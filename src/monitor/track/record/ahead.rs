@@ -62,6 +62,25 @@ impl LateRun {
 }
 
 impl HeldReading {
+    /// One that waits since now.
+    fn new(source: MeasuredAs, reading: Reading) -> Self {
+        Self {
+            unit: source.unit,
+            averaging: source.averaging,
+            reading,
+            before: 0,
+            was_first: false,
+            was_newest: false,
+        }
+    }
+
+    fn source(&self) -> MeasuredAs {
+        MeasuredAs {
+            unit: self.unit,
+            averaging: self.averaging,
+        }
+    }
+
     /// Whether a reading of `time` goes on where this one stands.
     pub(super) fn precedes(&self, time: Timestamp, within: SignedDuration) -> bool {
         let since = time.duration_since(self.reading.time);
@@ -84,14 +103,7 @@ impl BenchmarkRecord {
             self.newest
                 .map_or(0.0, |newest| days_of(reading.time.duration_since(newest)))
         );
-        self.ahead = Some(HeldReading {
-            unit: source.unit,
-            averaging: source.averaging,
-            reading: *reading,
-            before: 0,
-            was_first: false,
-            was_newest: false,
-        });
+        self.ahead = Some(HeldReading::new(source, *reading));
         self.fault(now, "leaps-ahead", text)
     }
 
@@ -117,12 +129,8 @@ impl BenchmarkRecord {
             self.benchmark,
         );
         self.ahead = Some(HeldReading {
-            unit: source.unit,
-            averaging: source.averaging,
-            reading,
-            before: 0,
-            was_first: false,
             was_newest: true,
+            ..HeldReading::new(source, reading)
         });
         self.late_run = LateRun::default();
         // Data time does not go back: what follows from readings of before it has its time until one comes after it.
@@ -135,12 +143,9 @@ impl BenchmarkRecord {
         source: MeasuredAs,
         reading: &Reading,
     ) -> Option<Event> {
-        let ahead = self.ahead.as_ref()?;
-        let own = MeasuredAs {
-            unit: ahead.unit,
-            averaging: ahead.averaging,
-        };
-        let value = self.history.value_of(own, &ahead.reading);
+        let is_over = |ahead: &&HeldReading| ahead.was_newest && reading.time >= ahead.reading.time;
+        let ahead = self.ahead.as_ref().filter(is_over)?;
+        let value = self.history.value_of(ahead.source(), &ahead.reading);
         let recent = self.history.values_as_read(ahead.unit, LIKE);
         let newest = self.history.value_of(source, reading);
         let bounds = |(low, high): (f64, f64), value: &f64| (low.min(*value), high.max(*value));
@@ -149,8 +154,7 @@ impl BenchmarkRecord {
             .fold((f64::INFINITY, f64::NEG_INFINITY), bounds);
         let off = OFF * (high - low);
         let is_like = (low.min(newest) - off..=high.max(newest) + off).contains(&value);
-        let is_wrong = ahead.was_newest && reading.time >= ahead.reading.time && !is_like;
-        let wrong = self.ahead.take_if(|_| is_wrong)?;
+        let wrong = self.ahead.take_if(|_| !is_like)?;
         let text = format!(
             "benchmark {}: the reading of {} is left out: others of the time before it came after it, and its value is not theirs",
             self.benchmark, wrong.reading.time
@@ -182,12 +186,8 @@ impl BenchmarkRecord {
             days_of(reading.time.duration_since(time))
         );
         self.ahead = Some(HeldReading {
-            unit: source.unit,
-            averaging: source.averaging,
-            reading,
-            before: 0,
             was_first: true,
-            was_newest: false,
+            ..HeldReading::new(source, reading)
         });
         self.newest = None;
         self.silence.begin_again();
@@ -205,11 +205,7 @@ impl BenchmarkRecord {
             let has_come = !moved_data_time && now >= ahead.reading.time;
             time >= ahead.reading.time || has_come
         })?;
-        let source = MeasuredAs {
-            unit: ahead.unit,
-            averaging: ahead.averaging,
-        };
-        Some((source, ahead.reading))
+        Some((ahead.source(), ahead.reading))
     }
 
     /// A reading of `time` has come, before the one that waits: that one waits on, or was wrong.
