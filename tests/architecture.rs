@@ -602,6 +602,69 @@ fn every_file_is_short_and_says_its_job_in_its_first_line() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// The wheel is built with `--locked` and has a lock file of its own, which `cargo` does not change when a dependency is added here.
+#[test]
+fn the_lock_file_of_the_wheel_names_the_dependencies_of_the_product() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |path: &str| -> toml::Table {
+        std::fs::read_to_string(root.join(path))
+            .unwrap()
+            .parse()
+            .unwrap()
+    };
+    let manifest = read("Cargo.toml");
+    let named = |table: &toml::Table| -> Vec<String> {
+        let dependencies = table.get("dependencies").and_then(toml::Value::as_table);
+        let optional = |value: &toml::Value| {
+            value.get("optional").and_then(toml::Value::as_bool) == Some(true)
+        };
+        let name = |(key, value): (&String, &toml::Value)| match value.get("package") {
+            Some(package) => package.as_str().unwrap().to_owned(),
+            None => key.clone(),
+        };
+        dependencies
+            .into_iter()
+            .flatten()
+            .filter(|(_, value)| !optional(value))
+            .map(name)
+            .collect()
+    };
+    let mut asked: BTreeSet<String> = named(&manifest).into_iter().collect();
+    let targets = manifest.get("target").and_then(toml::Value::as_table);
+    for target in targets
+        .into_iter()
+        .flatten()
+        .filter_map(|(_, value)| value.as_table())
+    {
+        asked.extend(named(target));
+    }
+    let lock = read("python/Cargo.lock");
+    let mut packages = lock["package"].as_array().unwrap().iter();
+    let product = packages
+        .find(|package| package["name"].as_str() == Some("slipwatch"))
+        .unwrap();
+    // A package that is there in two versions stands as its name and version.
+    let name = |value: &toml::Value| {
+        value
+            .as_str()
+            .unwrap()
+            .split(' ')
+            .next()
+            .unwrap()
+            .to_owned()
+    };
+    let locked: BTreeSet<String> = product["dependencies"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(name)
+        .collect();
+    assert_eq!(
+        locked, asked,
+        "run `cargo metadata` in python/ and commit its Cargo.lock"
+    );
+}
+
 mod the_reader_of_sources {
     use super::*;
 
