@@ -11,13 +11,12 @@ use super::log;
 use super::mqtt;
 use super::progress::Progress;
 use super::reporting::Reporting;
-use super::sandbox;
 use super::service_faults::{ServiceFault, ServiceFaults};
 use super::shutdown::Shutdown;
 use super::site::{Site, announce_ends};
 use super::sources::Sources;
 use super::tail::{Arrival, ArrivalBatch};
-use crate::config::{Config, HookConfig};
+use crate::config::Config;
 use crate::monitor::Input;
 use crate::reading::Timestamp;
 use crate::store::{Position, Store, StoreError, Verified};
@@ -82,9 +81,7 @@ pub(super) fn dispatcher(
     store: &Arc<Store>,
     faults: &ServiceFaults,
 ) -> Dispatcher {
-    sandbox::announce(&config.hooks);
-    let names: Vec<String> = config.hooks.iter().map(HookConfig::name).collect();
-    faults.keep_hooks(&names);
+    reload::announce_hooks(config, faults);
     let delivered = Delivered::of(Arc::clone(store)).reporting(faults);
     Dispatcher::start(&config.hooks, &Retry::default(), delivered)
 }

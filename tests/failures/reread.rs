@@ -236,6 +236,64 @@ fn a_reload_that_leaves_the_hooks_as_they_are_does_not_wait_for_one_that_runs() 
     site.proven_events();
 }
 
+/// The hook of a benchmark's red runs for longer than anybody waits; meanwhile the config loses that hook, gets another one, asks for more of
+/// a third, and has the first one back.
+#[test]
+fn a_reload_that_changes_hooks_does_not_wait_for_one_that_runs_nor_runs_it_twice() {
+    let hook = |script: &str, more: &str| {
+        format!("[[hook]]\nrun = [\"/bin/sh\", \"{script}\"]\ntimeout = \"60s\"\n{more}\n")
+    };
+    let each = format!("{}{}", benchmark("b", ""), benchmark("c", ""));
+    let slow = hook("slow.sh", "levels = [\"red\"]\nbenchmarks = [\"b\"]");
+    let third = |levels: &str| hook("third.sh", &format!("levels = [{levels}]"));
+    let site = Site::new(&format!("{each}{slow}{}{POLICY}", third("\"unknown\"")));
+    let script = "echo begun >> runs; sleep 12; touch ended\n";
+    fs::write(site.path("slow.sh"), script).unwrap();
+    for name in ["third", "added"] {
+        let script =
+            format!("echo $SLIPWATCH_BENCHMARK $SLIPWATCH_LEVEL $SLIPWATCH_STATE >> {name}.runs\n");
+        fs::write(site.path(&format!("{name}.sh")), script).unwrap();
+    }
+    let program = site.caught_up();
+    let text = |name: &str| format!("time,{name}_displacement_mm\n{}", failing(0..114));
+    let read = |name: &str| fs::read_to_string(site.path(name)).unwrap_or_default();
+    site.append("incoming/x.csv", &text("b"));
+    eventually("its run", || site.path("runs").exists());
+    let changed = format!(
+        "{}{}",
+        hook("added.sh", "levels = [\"red\"]"),
+        third("\"red\"")
+    );
+    reload(&site, &program, &format!("{each}{changed}{POLICY}"));
+    site.append("incoming/y.csv", &text("c"));
+    for name in ["added.runs", "third.runs"] {
+        eventually(name, || {
+            read(name).contains("c red firing") && read(name).contains("b red firing")
+        });
+    }
+    eventually("c's red", || site.notified("c/red/", "firing") == 1);
+    reload(&site, &program, &format!("{each}{slow}{changed}{POLICY}"));
+    assert!(!site.path("ended").exists(), "it waited for the hook");
+    eventually("the end of the run", || site.path("ended").exists());
+    program.stop();
+    for name in ["added.runs", "third.runs"] {
+        assert_eq!(
+            read(name).matches("b red firing").count(),
+            1,
+            "{}",
+            read(name)
+        );
+        assert_eq!(
+            read(name).matches("c red firing").count(),
+            1,
+            "{}",
+            read(name)
+        );
+    }
+    assert_eq!(read("runs"), "begun\n", "it was run for one red again");
+    site.proven_events();
+}
+
 #[test]
 fn maintenance_shows_as_it_is_declared_now_whether_a_reading_comes_or_not() {
     let site = Site::new(POLICY);

@@ -1,12 +1,13 @@
 //! The daemon takes up another config.
 
-use super::{DRAIN_LIMIT, Daemon, TICK, dispatcher};
-use crate::config::{self, Config, Token};
+use super::{DRAIN_LIMIT, Daemon};
+use crate::config::{self, Config, HookConfig, Token};
 use crate::monitor::Input;
 use crate::runtime::inherited::InheritedReadings;
 use crate::runtime::link;
 use crate::runtime::reloaded::{ConfigRefusal, sources_without_files};
-use crate::runtime::sandbox::OURSELVES;
+use crate::runtime::sandbox::{self, OURSELVES};
+use crate::runtime::service_faults::ServiceFaults;
 use crate::runtime::shutdown::Shutdown;
 use crate::runtime::sources::Sources;
 use crate::runtime::tail::Arrival;
@@ -25,29 +26,24 @@ pub(super) fn read_by_hooks(config: &Config) -> u64 {
     hasher.finish()
 }
 
-impl Daemon {
-    /// Waits for the hooks to finish, but where the daemon is to end. Were others notified of the same meanwhile, people would be notified
-    /// twice.
-    async fn close_hooks(&mut self, shutdown: &Shutdown) {
-        let Some(former) = self.site.unhook() else {
-            return;
-        };
-        let mut closing = std::pin::pin!(former.close(DRAIN_LIMIT));
-        let mut shutdown = shutdown.clone();
-        loop {
-            tokio::select! {
-                _ = &mut closing => return,
-                () = shutdown.requested() => return,
-                // Bounded, so it is no way of keeping a daemon that stands still alive.
-                () = tokio::time::sleep(TICK) => self.reporting.turn(),
-            }
-        }
-    }
+/// Says in the log what limits the hooks of `config`; faults of others are over.
+pub(super) fn announce_hooks(config: &Config, faults: &ServiceFaults) {
+    sandbox::announce(&config.hooks);
+    let names: Vec<String> = config.hooks.iter().map(HookConfig::name).collect();
+    faults.keep_hooks(&names);
+}
 
-    /// Whether the hooks of `fresh` are those at work, and the files that they took when they were set up are as they were. They go on then: no red
-    /// waits until a hook that runs has ended.
-    fn keeps_hooks(&self, fresh: &Config, read: u64) -> bool {
-        fresh.hooks == self.config.hooks && read == self.read_by_hooks
+impl Daemon {
+    /// Notifies the hooks of `fresh` from here on; `read` is what stands in the files that they take when they are set up. Those that are in the config
+    /// already go on, so no red waits until a hook that runs has ended.
+    fn change_hooks(&mut self, fresh: &Config, read: u64) -> Result<(), StoreError> {
+        let is_reread = read != self.read_by_hooks;
+        if !is_reread && fresh.hooks == self.config.hooks {
+            return Ok(());
+        }
+        announce_hooks(fresh, self.reporting.vitals.faults());
+        self.read_by_hooks = read;
+        (self.site).change_hooks(&fresh.hooks, is_reread, DRAIN_LIMIT)
     }
 
     /// The config file as it is now with its token, or why it cannot be taken.
@@ -151,14 +147,7 @@ impl Daemon {
         self.commit()?;
         // Before they are set up: what changes meanwhile is seen at the next reload.
         let read = read_by_hooks(&fresh);
-        if !self.keeps_hooks(&fresh, read) {
-            self.close_hooks(shutdown).await;
-            self.site.rehook(dispatcher(
-                &fresh,
-                &self.store,
-                self.reporting.vitals.faults(),
-            ))?;
-        }
+        self.change_hooks(&fresh, read)?;
         self.note_closed()?;
         self.note_inherited(&fresh)?;
         self.sources = Sources::start(&fresh, &self.store, self.reporting.vitals.faults())?;
@@ -171,7 +160,6 @@ impl Daemon {
         let has_lost_hooks = fresh.hooks.is_empty() && !self.config.hooks.is_empty();
         let were_fileless = sources_without_files(&self.config);
         (self.files_are_read, self.is_up_to_date) = (false, false);
-        self.read_by_hooks = read;
         self.config = fresh;
         self.reporting.service.ready("watching");
         tracing::info!(file = %self.config.file.display(), "the config is taken");

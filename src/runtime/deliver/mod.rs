@@ -7,7 +7,10 @@
 //! the daemon stops; the next start then offers them again. Whatever else is given up in the end.
 
 mod at_once;
+mod changed;
+mod order;
 mod runner;
+mod running;
 mod shares;
 mod worker;
 
@@ -22,11 +25,12 @@ use crate::config::HookConfig;
 use crate::monitor::EventKind;
 use crate::reading::BenchmarkId;
 use crate::store::DeliveryOutcome;
+use changed::{LeavingWorker, WorkerHandle};
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinSet;
 use worker::Worker;
 
@@ -74,9 +78,12 @@ impl Retry {
 /// The way to one hook.
 #[derive(Debug)]
 struct HookQueue {
-    hook: HookConfig,
+    hook: Arc<HookConfig>,
     queue: mpsc::Sender<Alert>,
     queued: Arc<Mutex<QueuedAlerts>>,
+    /// What the worker is to go by when the config says something else of the hook; `None` when it has no such hook any more.
+    changes: watch::Sender<Option<Arc<HookConfig>>>,
+    worker: WorkerHandle,
 }
 
 impl HookQueue {
@@ -120,7 +127,11 @@ fn without_reported(alerts: Vec<Alert>) -> (Vec<Alert>, Vec<Alert>) {
 pub struct Dispatcher {
     hooks: Vec<HookQueue>,
     workers: JoinSet<usize>,
+    /// Those of hooks that the config has no more.
+    leaving: Vec<LeavingWorker>,
     delivered: Arc<Mutex<Delivered>>,
+    runner: Arc<dyn Runner>,
+    retry: Retry,
 }
 
 impl Dispatcher {
@@ -137,26 +148,43 @@ impl Dispatcher {
         retry: &Retry,
         delivered: Delivered,
     ) -> Self {
-        let delivered = Arc::new(Mutex::new(delivered));
-        let mut workers = JoinSet::new();
-        let mut queues = Vec::new();
-        for hook in hooks {
-            let (queue, receiver) = mpsc::channel(QUEUE);
-            let queued = Arc::new(Mutex::new(QueuedAlerts::default()));
-            let (delivered, shared) = (Arc::clone(&delivered), Arc::clone(&queued));
-            let worker = Worker::new(hook, Arc::clone(runner), retry, delivered, shared);
-            workers.spawn(worker.run(receiver));
-            let hook = hook.clone();
-            queues.push(HookQueue {
-                hook,
-                queue,
-                queued,
-            });
-        }
-        Self {
-            hooks: queues,
-            workers,
-            delivered,
+        let mut started = Self {
+            hooks: Vec::new(),
+            workers: JoinSet::new(),
+            leaving: Vec::new(),
+            delivered: Arc::new(Mutex::new(delivered)),
+            runner: Arc::clone(runner),
+            retry: retry.clone(),
+        };
+        started.hooks = hooks.iter().map(|hook| started.begin(hook, None)).collect();
+        started
+    }
+
+    /// Starts the worker of `hook`, where there is a `former` one of that name once it has ended.
+    fn begin(&mut self, hook: &HookConfig, former: Option<oneshot::Receiver<()>>) -> HookQueue {
+        let hook = Arc::new(hook.clone());
+        let (queue, receiver) = mpsc::channel(QUEUE);
+        let (changes, changed) = watch::channel(Some(Arc::clone(&hook)));
+        let queued = Arc::new(Mutex::new(QueuedAlerts::default()));
+        let (delivered, shared) = (Arc::clone(&self.delivered), Arc::clone(&queued));
+        let runner = Arc::clone(&self.runner);
+        let worker = Worker::new(Arc::clone(&hook), runner, &self.retry, delivered, shared);
+        let (at_work, ended) = oneshot::channel::<()>();
+        let abort = self.workers.spawn(async move {
+            if let Some(former) = former {
+                // It sends nothing: closed when the worker has ended.
+                let _ = former.await;
+            }
+            let lost = worker.run(receiver, changed).await;
+            drop(at_work);
+            lost
+        });
+        HookQueue {
+            hook,
+            queue,
+            queued,
+            changes,
+            worker: WorkerHandle { abort, ended },
         }
     }
 

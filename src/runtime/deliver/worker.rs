@@ -1,9 +1,10 @@
 //! The worker of one hook: what is due, in the order of its severity, a few at once.
 
+use super::order::{is_severe, place, severity};
+use super::running::{Running, Waiting, finished, news, until};
 use super::{QUEUE, Retry, Runner, locked};
-use crate::alert::Level;
 use crate::config::HookConfig;
-use crate::reading::{BenchmarkId, Timestamp, counted};
+use crate::reading::{Timestamp, counted};
 use crate::runtime::clock;
 use crate::runtime::delivered::Delivered;
 use crate::runtime::hook::{Alert, HookOutcome, MessageState};
@@ -11,12 +12,9 @@ use crate::runtime::queued_alerts::QueuedAlerts;
 use crate::store::DeliveryOutcome;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::pin::Pin;
 use std::sync::{Arc, Mutex};
-use std::task::Poll;
 use std::time::Duration;
-use tokio::sync::mpsc;
-use tokio::task::JoinHandle;
+use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
 
 /// So long at most until what waits for its escalation or for somebody on duty is looked at again: the host's clock may be
@@ -31,44 +29,6 @@ const MOST_AT_ONCE: usize = 4;
 const MORE_OF_SEVERE: usize = 2;
 /// A run that lasts longer than this does not keep a graver alert of its own benchmark waiting either, and is broken off for it; the run of an end does.
 const KEEPS_WAITING: Duration = Duration::from_secs(10);
-
-#[derive(Debug)]
-struct Waiting {
-    alert: Alert,
-    /// Counts from 1, over restarts.
-    attempt: u32,
-    /// Not tried since the start.
-    is_new: bool,
-    /// An escalation: from when on it does not wait for an acknowledgement any more, and when it was noted.
-    escalation: Option<(Instant, Option<Timestamp>)>,
-    /// It waits for an acknowledgement, for somebody on duty or for the end of a silence: it is not sent on the way out either.
-    is_held: bool,
-}
-
-/// How grave it is: of two that are due the higher goes first.
-fn severity(alert: &Alert) -> u8 {
-    match (alert.level, alert.state) {
-        (Level::Red, MessageState::Firing) => 5,
-        (Level::Orange, MessageState::Firing) => 4,
-        (Level::Unknown, MessageState::Firing) => 3,
-        (
-            Level::Red | Level::Orange | Level::Unknown,
-            MessageState::Resolved | MessageState::Correction,
-        ) => 2,
-        (Level::Yellow, _) => 1,
-        (Level::Green, _) => 0,
-    }
-}
-
-/// Whether people may have to leave their houses.
-fn is_severe(alert: &Alert) -> bool {
-    severity(alert) >= 4
-}
-
-/// What is reported by one run at a time, so that its order stays.
-fn place(alert: &Alert) -> Option<&BenchmarkId> {
-    alert.event.benchmark.as_ref()
-}
 
 /// What is shown of a hook where others than its owner look: without its arguments, which may hold addresses and secrets.
 fn short_name(hook: &HookConfig) -> String {
@@ -114,18 +74,20 @@ pub(super) struct Worker {
     untried: usize,
     taken: u64,
     lost: usize,
+    /// The config has this hook no more: it only ends what it runs.
+    is_left_out: bool,
 }
 
 impl Worker {
     pub(super) fn new(
-        hook: &HookConfig,
+        hook: Arc<HookConfig>,
         runner: Arc<dyn Runner>,
         retry: &Retry,
         delivered: Arc<Mutex<Delivered>>,
         queued: Arc<Mutex<QueuedAlerts>>,
     ) -> Self {
         Self {
-            hook: Arc::new(hook.clone()),
+            hook,
             runner,
             retry: retry.clone(),
             delivered,
@@ -135,12 +97,21 @@ impl Worker {
             untried: 0,
             taken: 0,
             lost: 0,
+            is_left_out: false,
         }
     }
 
-    pub(super) async fn run(mut self, mut queue: mpsc::Receiver<Alert>) -> usize {
+    pub(super) async fn run(
+        mut self,
+        mut queue: mpsc::Receiver<Alert>,
+        mut changes: watch::Receiver<Option<Arc<HookConfig>>>,
+    ) -> usize {
         let mut open = true;
         loop {
+            // Before what has come: that is for the hook as it is now.
+            if let Some(hook) = news(&mut changes) {
+                self.change(hook);
+            }
             // What has come by now is weighed together.
             while open && self.untried < QUEUE {
                 match queue.try_recv() {
@@ -155,6 +126,7 @@ impl Worker {
             let due = self.next_due(open);
             tokio::select! {
                 biased;
+                Ok(()) = changes.changed(), if open => changes.mark_changed(),
                 alert = queue.recv(), if open && self.untried < QUEUE => match alert {
                     Some(alert) => self.begin(alert),
                     None => open = false,
@@ -299,6 +271,16 @@ impl Worker {
         self.report(waiting, outcome);
         if outcome == Some(&HookOutcome::Done) {
             self.finish(&waiting.alert, DeliveryOutcome::Delivered);
+        } else if self.is_left_out {
+            // What it was to get is closed already, and goes to the hooks that ask for it.
+            tracing::warn!(
+                hook,
+                key,
+                attempt,
+                ?outcome,
+                "alert not delivered: the config has the hook no more"
+            );
+            locked(&self.queued).release(&waiting.alert);
         } else if self.is_over(&waiting.alert) {
             self.drop_over(&waiting.alert);
         } else if open && goes_on {
@@ -388,7 +370,37 @@ impl Worker {
         self.finish(alert, DeliveryOutcome::Over);
     }
 
+    /// Goes by what the config says of the hook now. What it does not ask for any more is not sent to it, and nothing that waits where the config
+    /// has it no more.
+    fn change(&mut self, hook: Option<Arc<HookConfig>>) {
+        self.is_left_out = hook.is_none();
+        self.hook = hook.unwrap_or(Arc::clone(&self.hook));
+        for (turn, mut waiting) in std::mem::take(&mut self.waiting) {
+            self.untried -= usize::from(waiting.is_new);
+            if !self.is_wanted(&waiting.alert) {
+                locked(&self.queued).release(&waiting.alert);
+                continue;
+            }
+            if waiting.is_new {
+                self.untried += 1;
+                waiting.escalation = self.escalation(&waiting.alert);
+            }
+            self.waiting.insert(turn, waiting);
+        }
+    }
+
+    /// Whether the hook asks for it; an end goes to whoever has received the beginning.
+    fn is_wanted(&self, alert: &Alert) -> bool {
+        !self.is_left_out && (alert.state == MessageState::Resolved || self.hook.asks_for(alert))
+    }
+
     fn begin(&mut self, alert: Alert) {
+        // A worker before this one may have had it taken, where the hook was left out of the config and put back.
+        let is_taken = locked(&self.delivered).has(&alert, &self.hook.name());
+        if is_taken || !self.is_wanted(&alert) {
+            locked(&self.queued).release(&alert);
+            return;
+        }
         let before = locked(&self.delivered).attempts(&alert, &self.hook.name());
         let escalation = (before == 0).then(|| self.escalation(&alert)).flatten();
         let waiting = Waiting {
@@ -441,38 +453,5 @@ impl HookConfig {
         let gone = gone.and_then(|gone| Duration::try_from(gone).ok());
         let left = after.saturating_sub(gone.unwrap_or(Duration::ZERO));
         left.min(latest.saturating_duration_since(now))
-    }
-}
-
-/// A hook's run, and for what. It ends with its worker.
-#[derive(Debug)]
-struct Running {
-    task: JoinHandle<HookOutcome>,
-    waiting: Waiting,
-    started: Instant,
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        self.task.abort();
-    }
-}
-
-/// The first run that ends, by its place; `None` when it broke off.
-async fn finished(running: &mut [Running]) -> (usize, Option<HookOutcome>) {
-    std::future::poll_fn(|context| {
-        for (index, run) in running.iter_mut().enumerate() {
-            if let Poll::Ready(ended) = Pin::new(&mut run.task).poll(context) {
-                return Poll::Ready((index, ended.ok()));
-            }
-        }
-        Poll::Pending
-    })
-    .await
-}
-
-async fn until(due: Option<Instant>) {
-    if let Some(due) = due {
-        tokio::time::sleep_until(due).await;
     }
 }

@@ -7,11 +7,11 @@ use crate::alert::{Level, Policy};
 use crate::config::HookConfig;
 use crate::monitor::Event;
 use crate::reading::{BenchmarkId, Timestamp};
-use crate::runtime::deliver::Dispatcher;
 use crate::runtime::delivered::delivery;
 use crate::runtime::hook::Alert;
 use crate::store::StoreError;
 use jiff::SignedDuration;
+use std::time::Duration;
 
 impl Site {
     /// Makes everything since the last commit durable in one transaction, then hands the alerts to the hooks, but
@@ -167,18 +167,20 @@ impl Site {
         self.is_full
     }
 
-    /// Notifies no hook from here on; returns the way to those that were notified. It is to be closed before
-    /// [`Site::rehook`], or what waits is sent by both.
-    pub fn unhook(&mut self) -> Option<Dispatcher> {
-        self.sinks.alerts.take()
-    }
-
-    /// Notifies these hooks from here on, first what some hook has not taken yet.
+    /// Notifies `hooks` from here on, first what some hook has not taken yet; those that are in the config already go on. See
+    /// [`Dispatcher::change_hooks`](crate::runtime::deliver::Dispatcher::change_hooks).
     ///
     /// # Errors
     /// When the state cannot be read.
-    pub fn rehook(&mut self, alerts: Dispatcher) -> Result<(), StoreError> {
-        self.sinks.alerts = Some(alerts);
+    pub fn change_hooks(
+        &mut self,
+        hooks: &[HookConfig],
+        is_reread: bool,
+        limit: Duration,
+    ) -> Result<(), StoreError> {
+        if let Some(alerts) = &mut self.sinks.alerts {
+            alerts.change_hooks(hooks, is_reread, limit);
+        }
         self.wait_for_hooks()
     }
 
