@@ -65,10 +65,11 @@ impl Search<'_> {
         for (k, one) in refitted.iter().enumerate() {
             let (held, objection) = judged[k].clone();
             let reason = objection.map(|objection| objection.why);
-            // Of one effect with two delays that one stands which was chosen, or else the better.
+            // Of one effect with two delays, or of two jumps, that one stands which was chosen, or else the better.
             let stands = chosen.filter(|first| refitted[*first].is_as(one));
             let stands = stands.unwrap_or(refitted.iter().position(|known| known.is_as(one))?);
-            if one.term.channel.is_some() && stands != k {
+            let has_one_note = one.term.channel.is_some() || one.term.is_jump_of_reading();
+            if has_one_note && stands != k {
                 continue;
             }
             let beaten = chosen.filter(|first| *first != k && reason.is_none());

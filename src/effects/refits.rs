@@ -15,7 +15,7 @@ use super::response::Driver;
 use super::search::{DeclaredPart, Refitted, SIGNIFICANT, Search};
 use super::surrogate::{Innovations, NullGains};
 use super::term::Term;
-use super::trials::{Trial, TrialBase, shortlist};
+use super::trials::{Trial, TrialBase, best_against_the_motion, best_of_each_kind, shortlist};
 use std::cell::LazyCell;
 
 /// Most candidates refitted for one place: the best of each covariate, and of the kinds that need none.
@@ -109,8 +109,10 @@ impl<'a> Search<'a> {
         let steady = steady.as_ref().and_then(|law| self.ground(law));
         let covariates = self.through_covariates(base, &ground, steady.as_ref());
         let (others, tried) = ground.of_itself();
+        let back = best_against_the_motion(&others, &ground);
         let mut best = best_of_each_kind(others);
         best.truncate(MOST_OTHERS);
+        best.extend(back);
         let mut others = self.refit_each(base, best);
         self.with_a_step_about_a_steady_law(base, steady.as_ref(), &mut others);
         self.events_at_one_time(base, &mut others);
@@ -473,17 +475,6 @@ fn best_of_each_response(mut all: Vec<Refitted>, margin: f64) -> Vec<Refitted> {
         };
         if is_kept {
             best.push(one);
-        }
-    }
-    best
-}
-
-fn best_of_each_kind(mut trials: Vec<Trial>) -> Vec<Trial> {
-    trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let mut best: Vec<Trial> = Vec::new();
-    for trial in trials {
-        if !best.iter().any(|known| known.term.kind == trial.term.kind) {
-            best.push(trial);
         }
     }
     best

@@ -194,3 +194,28 @@ impl TrialBase<'_> {
         noise_alone(&self.frames, tried, kind, count, seed)
     }
 }
+
+/// The best jump of the reading against the motion, where that of all is along it: which may be slip, and is refused then.
+pub(super) fn best_against_the_motion(trials: &[Trial], ground: &TrialBase) -> Option<Trial> {
+    let back = |trial: &&Trial| {
+        let at = trial.term.at.filter(|at| *at > 0);
+        at.is_some_and(|at| ground.residual[at] < ground.residual[at - 1])
+    };
+    let by_gain = |a: &&Trial, b: &&Trial| a.gain.total_cmp(&b.gain);
+    let jumps = || trials.iter().filter(|one| one.term.is_jump_of_reading());
+    let best = jumps().max_by(by_gain)?;
+    let against = jumps().filter(back).max_by(by_gain)?;
+    (!back(&best) && against.gain > 0.0).then(|| against.clone())
+}
+
+/// The best of each kind, those that gain most first.
+pub(super) fn best_of_each_kind(mut trials: Vec<Trial>) -> Vec<Trial> {
+    trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut best: Vec<Trial> = Vec::new();
+    for trial in trials {
+        if !best.iter().any(|known| known.term.kind == trial.term.kind) {
+            best.push(trial);
+        }
+    }
+    best
+}
