@@ -32,14 +32,25 @@ fn watched(more: &str) -> Site {
 #[test]
 fn an_export_that_is_issued_again_with_another_zero_calls_no_red() {
     // Also one that is read in several pieces, and one with its newest row on top.
-    for (rows, is_newest_first) in [(100, false), (700, false), (200, true)] {
+    for (rows, is_newest_first) in [(100, false), (700, false), (200, true), (700, true)] {
         let site = watched(FAR);
         let count = usize::try_from(rows).unwrap();
         site.append("incoming/b.csv", &export(rows, 100.0, is_newest_first));
         let program = site.caught_up();
         eventually("the readings", || site.values().len() >= count);
         for zero in [20.0, 180.0] {
-            replaced(&site, &export(rows, zero, is_newest_first), count);
+            let text = export(rows, zero, is_newest_first);
+            let one_more = format!(
+                "{HEADER}{},{}\n",
+                clock::now(),
+                zero + 0.01 * f64::from(rows)
+            );
+            let text = if is_newest_first {
+                text.replacen(HEADER, &one_more, 1)
+            } else {
+                text
+            };
+            replaced(&site, &text, count);
         }
         let more = format!("{},180.5\n", clock::now());
         if !is_newest_first {

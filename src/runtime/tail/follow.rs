@@ -19,6 +19,8 @@ use std::time::Duration;
 /// Values in one batch at most: while the past is read, and later, when what comes live does not wait for a backlog.
 const BATCH: usize = 1000;
 const LIVE_BATCH: usize = 250;
+/// Of a table whose rows go back in time so many are taken at once: those of each minute over two weeks.
+const MOST_BACKWARDS: usize = 20_000;
 /// While a backlog is read the other files are looked at so often.
 const LOOK_BESIDE: Duration = Duration::from_millis(250);
 
@@ -188,9 +190,27 @@ impl Follower {
         let most = if self.is_live { LIVE_BATCH } else { BATCH };
         let mut read = arrivals.len();
         let mut direct = Vec::new();
-        while read < most
-            && let Some((.., key)) = self.heads.pop_first()
-        {
+        let mut newest: Option<(FileKey, Timestamp)> = None;
+        while let Some((time, .., key)) = self.heads.first() {
+            // A table with its newest row on top is read on, or that row would be judged by a record of which nothing else is corrected.
+            let earlier = newest
+                .as_ref()
+                .is_some_and(|(file, newest)| file == key && time < newest);
+            if read
+                >= if earlier {
+                    MOST_BACKWARDS.max(most)
+                } else {
+                    most
+                }
+            {
+                break;
+            }
+            if !earlier {
+                newest = Some((key.clone(), *time));
+            }
+            let Some((.., key)) = self.heads.pop_first() else {
+                break;
+            };
             let Some(file) = self.files.get_mut(&key) else {
                 continue;
             };
@@ -199,7 +219,6 @@ impl Follower {
             file.refill();
             self.heads.extend(head(key, file));
         }
-        // A table may stand with its newest row on top: read again after a correction of all rows, it would be judged by that one alone.
         direct.sort_by(|one, other| one.rank().cmp(&other.rank()));
         arrivals.extend(merged(self.release(host_time), direct));
         let is_due = |source: &Followed| source.reorder.as_ref().is_some_and(Reorder::is_due);
