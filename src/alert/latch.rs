@@ -4,7 +4,7 @@
 //! highest velocity seen at this level, without gaining, for a whole evacuation time in which the evidence
 //! called for less, and no chance calls orange where it is red; or it has been seen to hold a velocity under the critical one, without gaining, for the
 //! stated time, and is no faster than when the level was called, or than half of the highest velocity while no chance calls orange, or nothing is called any
-//! more. What lies within the error of a velocity is no gain, and motion that never stood out of it has not to slow down.
+//! more, or where it is red no more than yellow. What lies within the error of a velocity is no gain, and motion that never stood out of it has not to slow down.
 
 use super::evidence::AlertEvidence;
 use super::level::Level;
@@ -245,14 +245,15 @@ impl Latch {
         let is_likely = policy.orange_by_chance(evidence).is_some();
         let pauses = self.level == Level::Red && is_likely;
         let slowed = less && is_slow && !pauses;
-        // A slope that has become faster since the level was called is not over it while more than nothing is called, until it has slowed
-        // down to half of its highest velocity and no chance calls orange.
+        // A slope that has become faster since the level was called is not over it while more than nothing is called, in red more than yellow, until it has
+        // slowed down to half of its highest velocity and no chance calls orange.
         let is_no_faster = velocity <= STEADY_GAIN * self.first_velocity + CLEAR_ERRORS * error;
         let is_past_its_peak = self.is_at_half_of_its_peak(velocity, error) && !is_likely;
         let is_over = is_no_faster
             || is_past_its_peak
             || self.first_velocity <= 0.0
-            || call.level == Level::Green;
+            || call.level == Level::Green
+            || self.level == Level::Red && call.level == Level::Yellow;
         let steady = less && is_over && !pauses && velocity < policy.critical_velocity_mm_per_day;
         let motion = (velocity, error);
         self.slow = SteadyStretch::go_on(self.slow, slowed.into(), evidence.now, motion);
@@ -482,10 +483,12 @@ mod tests {
     }
 
     #[test]
-    fn a_slope_that_is_twice_as_fast_as_at_the_call_is_over_it_only_where_nothing_is_called() {
+    fn a_slope_that_is_twice_as_fast_as_at_the_call_is_over_it_only_where_nothing_is_called_or_in_red_no_more_than_yellow()
+     {
         let (policy, latch) = red_at_hundred();
-        let after = |chance: f64| {
+        let after = |first: Level, chance: f64| {
             let mut latch = latch.clone();
+            latch.level = first;
             for hour in 1..20 * 24 {
                 let creeps = 200.0 + 0.1 * f64::from(u8::try_from(hour / 24).unwrap());
                 let outlook = AlertEvidence {
@@ -496,15 +499,19 @@ mod tests {
             }
             latch.level()
         };
-        assert_eq!(after(0.5), Level::Red);
-        assert_eq!(after(0.0), Level::Green);
+        assert_eq!(after(Level::Red, 0.75), Level::Red);
+        assert_eq!(after(Level::Red, 0.5), Level::Yellow);
+        assert_eq!(after(Level::Orange, 0.5), Level::Orange);
+        assert_eq!(after(Level::Orange, 0.0), Level::Green);
+        assert_eq!(after(Level::Red, 0.0), Level::Green);
     }
 
     #[test]
     fn a_surge_that_slows_down_is_over_once_it_has_been_at_half_of_its_peak_for_the_stated_time() {
         let (policy, latch) = red_at_hundred();
-        let reds = |chance: f64, slow: f64| {
+        let days = |first: Level, chance: f64, slow: f64| {
             let mut latch = latch.clone();
+            latch.level = first;
             let level = |hour: i64| {
                 let velocity = if hour < 5 * 24 { 400.0 } else { slow };
                 let outlook = AlertEvidence {
@@ -515,12 +522,15 @@ mod tests {
                 latch.level()
             };
             let levels = (1..20 * 24).map(level);
-            levels.filter(|level| *level == Level::Red).count() / 24
+            levels.filter(|level| *level == first).count() / 24
         };
-        assert_eq!(reds(0.5, 150.0), 11);
+        assert_eq!(days(Level::Orange, 0.5, 150.0), 11);
         // It is no slower than half, or the outlook calls orange.
-        assert_eq!(reds(0.5, 250.0), 19);
-        assert_eq!(reds(0.75, 150.0), 19);
+        assert_eq!(days(Level::Orange, 0.5, 250.0), 19);
+        assert_eq!(days(Level::Orange, 0.75, 150.0), 19);
+        // Red is over sooner: it has not gained for the stated time, and no more than yellow is called.
+        assert_eq!(days(Level::Red, 0.5, 250.0), 7);
+        assert_eq!(days(Level::Red, 0.75, 150.0), 19);
     }
 
     #[test]

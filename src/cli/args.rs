@@ -447,7 +447,7 @@ pub(super) fn warn_of(disorder: Disorder) {
 }
 
 /// A column's name may hold `=`.
-fn stated(text: &str) -> Result<(String, CovariateKind), String> {
+pub(super) fn stated(text: &str) -> Result<(String, CovariateKind), String> {
     let parts = text.rsplit_once('=').filter(|(name, _)| !name.is_empty());
     let (name, kind) = parts.ok_or("write NAME=KIND, such as Nied_1h=rain")?;
     Ok((name.to_owned(), CovariateKind::parse(kind)?))

@@ -52,6 +52,11 @@ pub(super) struct Exec {
 /// A hook that did not take the drill.
 #[derive(Debug, thiserror::Error)]
 enum Failed {
+    /// The config has none.
+    #[error(
+        "the config has no [[hook]]: nobody is notified of an alert; add one with run = [\"./notify.sh\"]"
+    )]
+    NoHook,
     /// No hook would be run.
     #[error("no hook asks for {0}")]
     None(String),
@@ -107,6 +112,9 @@ fn test(args: &Test) -> anyhow::Result<()> {
         .iter()
         .filter_map(|hook| Some((hook, of_hook(hook, args.level)?)))
         .collect();
+    if config.hooks.is_empty() {
+        return Err(Failed::NoHook.into());
+    }
     if asked.is_empty() {
         let level = args.level.map_or("any level", Level::name);
         return Err(Failed::None(level.to_owned()).into());

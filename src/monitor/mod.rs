@@ -314,6 +314,7 @@ impl Monitor {
             track.take(policy, source, reading, &context)
         });
         self.batches.note(benchmark, track);
+        self.past.note(benchmark, reading.time);
         let critical = policy.critical_velocity_mm_per_day;
         self.searches.extend(track.search(critical, &context));
         self.benchmarks.note_changed(benchmark);

@@ -60,6 +60,15 @@ impl Past {
         self.walk.take_if(|walk| walk.benchmark() == benchmark);
     }
 
+    /// A reading of `benchmark`, of `time`, has been taken.
+    pub(super) fn note(&mut self, benchmark: &BenchmarkId, time: Timestamp) {
+        if let Some(walk) = &mut self.walk
+            && walk.benchmark() == benchmark
+        {
+            walk.note(time);
+        }
+    }
+
     /// The past that is being judged.
     pub(super) fn walk(&self) -> Option<&PastReplay> {
         self.walk.as_ref()
@@ -82,6 +91,19 @@ impl Input {
             matches!(event.kind, EventKind::Refit { .. }) || event.kind.is_of_the_record()
         };
         matches!(self, Self::Notice(Notice::Retrace)) && is_past
+    }
+}
+
+impl Event {
+    /// Since when the level is in force that it calls: one that was found in the past is since then, by its key.
+    pub fn in_force_since(&self) -> Timestamp {
+        let EventKind::Alert { key, rule, .. } = &self.kind else {
+            return self.time;
+        };
+        let since = key.rsplit('/').next().filter(|_| rule == PAST);
+        since
+            .and_then(|since| since.parse().ok())
+            .unwrap_or(self.time)
     }
 }
 

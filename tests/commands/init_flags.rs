@@ -149,6 +149,19 @@ fn a_file_of_covariates_alone_goes_beside_one_with_readings() {
         said.contains("--column \"lower=P1:displacement:mm\""),
         "{said}"
     );
+    let stated = [
+        "init",
+        "slope.csv",
+        "lower.csv",
+        "--force",
+        "--covariate",
+        "lower=level",
+    ];
+    let (exit, out, err) = office.say(&stated);
+    assert!(
+        exit == 0 && out.contains("covariate lower (level): 60 values"),
+        "{out}{err}"
+    );
     let both = rows(60, |time, value| format!("{time}+02:00,0.2,{value}\n"));
     let both = format!("time,rain_mm,way_cm\n{both}");
     let office = Office::with(&[("slope.csv", &both)]);

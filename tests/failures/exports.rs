@@ -64,6 +64,43 @@ fn an_export_that_is_issued_again_with_another_zero_calls_no_red() {
 }
 
 #[test]
+fn an_export_with_another_zero_that_comes_while_the_history_is_judged_calls_no_red_of_the_past() {
+    let site = watched(FAR);
+    site.append("incoming/b.csv", &export(900, 100.0, false));
+    let program = site.caught_up();
+    eventually("some of the history", || {
+        site.events().contains("\"refit\"")
+    });
+    replaced(&site, &export(900, 180.0, false), 900);
+    let is_judged = || {
+        site.log()
+            .contains("before the first start has been judged")
+    };
+    eventually("the history", is_judged);
+    program.stop();
+    assert_eq!(site.notified("b/red/", ""), 0, "{}", site.events());
+    let events = site.events();
+    let refits = events
+        .lines()
+        .filter(|line| line.contains("\"event\":\"refit\""));
+    let time = |line: &str| {
+        let event: serde_json::Value = serde_json::from_str(line).unwrap();
+        event["time"].as_str().unwrap().to_owned()
+    };
+    let mut times: Vec<String> = refits.map(time).collect();
+    times.sort();
+    // The newest reading was judged before and after it was corrected.
+    let newest = times.last().cloned();
+    times.retain(|time| Some(time) != newest.as_ref());
+    assert!(
+        times.windows(2).all(|two| two[0] != two[1]),
+        "twice: {times:?}"
+    );
+    assert!(times.len() > 100, "{events}");
+    site.proven_events();
+}
+
+#[test]
 fn an_upload_with_its_newest_row_on_top_calls_what_is_due_in_its_middle() {
     let site = Site::new(&format!(
         "{}[alert]\nevacuation_time = \"24h\"\n{THRESHOLD}",

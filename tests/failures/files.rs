@@ -21,6 +21,29 @@ fn gaps(site: &Site) -> usize {
     site.events().matches("\"kind\":\"possible-gap\"").count()
 }
 
+#[test]
+fn a_row_that_is_ended_only_by_the_next_one_is_read_where_three_before_it_were_and_comes_again_with_its_rest()
+ {
+    let site = Site::new("");
+    site.append("incoming/5.csv", HEADER.trim_end());
+    let program = site.caught_up();
+    for day in 1..6 {
+        site.append("incoming/5.csv", &format!("\n{}", row(day).trim_end()));
+        let before = day as usize - 1;
+        eventually("the row before it", || site.values().len() >= before);
+    }
+    eventually("the last one", || site.values().len() == 5);
+    // Its writer was not done with this one.
+    site.append("incoming/5.csv", "\n2020-01-06T00:00:00Z,6");
+    eventually("what is there of it", || site.values().len() == 6);
+    site.append("incoming/5.csv", ".25\n2020-01-07T00:00:00Z,7\n");
+    eventually("its rest, and another one", || site.values().len() == 8);
+    program.stop();
+    let values: Vec<String> = site.values().iter().map(|one| format!("{one:?}")).collect();
+    assert!(values.iter().any(|one| one.contains("6.25")), "{values:?}");
+    assert!(!site.events().contains("quarantined"), "{}", site.events());
+}
+
 /// 1. While it runs, and while it does not.
 #[test]
 fn a_file_copied_and_truncated_is_read_again_and_a_possible_gap_is_said_once_each() {

@@ -134,8 +134,16 @@ fn past_red(hooks: &str) -> Site {
 #[test]
 fn a_red_of_the_past_that_nothing_has_ended_is_reported_after_a_first_start() {
     let site = past_red("");
+    let listen = site.listen();
     let program = site.caught_up();
     eventually("the red notified", || site.notified("5/red/", "firing") > 0);
+    // The page says since when, and not when it was found.
+    let notified = site.lines("notified");
+    let red = notified.iter().find(|line| line.starts_with("5/red/"));
+    let since = red.unwrap().trim_start_matches("5/red/").split(' ').next();
+    let said = format!("\"since\":\"{}\"", since.unwrap());
+    let shown = crate::site::get(&listen, "/api/site");
+    assert!(shown.contains(&said), "{said}: {shown}");
     program.stop();
     site.proven_events();
 }

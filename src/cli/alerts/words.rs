@@ -168,7 +168,7 @@ fn valid(alert: &AlertView, clock: &dyn Fn(Timestamp) -> String) -> String {
 
 fn deliveries(rows: &[DeliveryRow]) -> String {
     if rows.is_empty() {
-        return "deliveries   none: no hook asks for it, or they have been removed with time\n"
+        return "deliveries   none: no hook asks for it, or its newest reading was long past when it was read (nobody is notified of that), or they have been removed with time\n"
             .to_owned();
     }
     let mut out = "deliveries\n".to_owned();

@@ -134,7 +134,9 @@ fn effects(explanation: &Explanation) -> Option<TextTable> {
     let names = accepted.iter().map(|effect| effect.effect.to_string());
     let mut table = TextTable::headed([String::new()].into_iter().chain(names));
     let adds = format!("adds to the readings, rms {}", explanation.unit);
-    let rows: [(&str, PageCell); 16] = [
+    let per_sd = format!("in the reading per sd, {}", explanation.unit);
+    let per_sd_bounds = format!("{per_sd}, 5 to 95 %");
+    let rows: [(&str, PageCell); 18] = [
         ("channel", |effect| {
             effect.channel.clone().unwrap_or_else(dash)
         }),
@@ -156,9 +158,17 @@ fn effects(explanation: &Explanation) -> Option<TextTable> {
         ("velocity factor per sd", |effect| {
             number(effect.velocity_factor_per_sd)
         }),
-        ("log-load per sd", |effect| number(effect.gain_per_sd)),
+        ("log-load per sd", |effect| {
+            number(effect.gain_per_sd.filter(|_| !is_in_the_reading(effect)))
+        }),
         ("log-load per sd, 5 to 95 %", |effect| {
-            interval(effect.gain_interval)
+            interval(effect.gain_interval.filter(|_| !is_in_the_reading(effect)))
+        }),
+        (&per_sd, |effect| {
+            number(effect.gain_per_sd.filter(|_| is_in_the_reading(effect)))
+        }),
+        (&per_sd_bounds, |effect| {
+            interval(effect.gain_interval.filter(|_| is_in_the_reading(effect)))
         }),
         ("mean delay, days", |effect| number(effect.lag_days)),
         ("95 % of the response, days", |effect| {
@@ -179,6 +189,11 @@ fn effects(explanation: &Explanation) -> Option<TextTable> {
     let gains = accepted.iter().map(|effect| gain(effect.bic_gain));
     table.row(["BIC gain".to_owned()].into_iter().chain(gains));
     Some(table)
+}
+
+/// What acts in the reading has a unit; a load is a pure number.
+fn is_in_the_reading(effect: &Effect) -> bool {
+    effect.unit.is_some()
 }
 
 fn interval(bounds: Option<[f64; 2]>) -> String {

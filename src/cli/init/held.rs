@@ -65,8 +65,8 @@ pub(super) fn held(
         });
     let found: Vec<PlannedBenchmark> = found.collect();
     if found.is_empty() {
-        let problem = without_readings(file, &looked);
-        return Ok(match covariates_alone(&looked) {
+        let problem = without_readings(file, &looked, &args.covariates);
+        return Ok(match covariates_alone(&looked, &args.covariates) {
             Some(names) => FoundInFile::Covariates(names, problem),
             None => FoundInFile::unusable(problem),
         });

@@ -12,11 +12,11 @@ mod text;
 mod times;
 mod unnamed;
 
-use super::args::{DialectArgs, FileArgs, OutputArgs};
+use super::args::{DialectArgs, FileArgs, OutputArgs, stated};
 use super::check;
 use super::exit::{self, NoSuchReadings, UsageError};
 use crate::config::{SourceKind, value};
-use crate::reading::{Dialect, SummerTime, TimeFormat, Timestamp};
+use crate::reading::{CovariateKind, Dialect, SummerTime, TimeFormat, Timestamp};
 use crate::runtime::ingest::{
     IngestError, Measure, ReadOptions, read_with_remarks, survey, text_format_of, unit_in_name,
     unpacked_name,
@@ -56,6 +56,9 @@ pub(super) struct Args {
     /// How long it takes to bring everyone out, such as 12h
     #[arg(long, value_name = "DURATION", value_parser = value::duration)]
     evacuation_time: Option<SignedDuration>,
+    /// What a covariate measures whose name does not say it: rain, flow, level, temperature, humidity, pressure or other
+    #[arg(long = "covariate", value_name = "NAME=KIND", value_parser = stated)]
+    covariates: Vec<(String, CovariateKind)>,
     /// Write over a config that is there
     #[arg(long)]
     force: bool,
@@ -79,6 +82,8 @@ struct InitPlan {
     missing: Vec<String>,
     sources: Vec<PlannedSource>,
     benchmarks: Vec<PlannedBenchmark>,
+    /// Columns and kinds of those whose names do not say what they measure.
+    covariates: Vec<(String, CovariateKind)>,
     /// Of every velocity, where that is said.
     averaging: Option<String>,
     evacuation_time: Option<String>,
@@ -239,6 +244,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
         missing: args.file.missing.clone(),
         sources,
         benchmarks: benchmarks.into_values().collect(),
+        covariates: args.covariates.clone(),
         averaging: args.file.averaging.map(in_words),
         evacuation_time: args.evacuation_time.map(in_words),
         hook: args.hook.clone(),

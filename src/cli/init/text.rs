@@ -53,6 +53,14 @@ pub(super) fn config(plan: &InitPlan) -> String {
         }
         text.push('\n');
     }
+    for (column, kind) in &plan.covariates {
+        let _ = write!(
+            text,
+            "[[covariate]]\ncolumn = {}\nkind = {}\n\n",
+            quoted(column),
+            quoted(kind.name())
+        );
+    }
     alert_lines(&mut text, plan);
     text
 }

@@ -1,11 +1,15 @@
 //! What is said of a file without readings.
 
-use crate::reading::{Unit, bracketed};
+use crate::reading::{CovariateKind, Unit, bracketed};
 use crate::runtime::ingest::{FileSurvey, Meaning, unit_in_name};
 use std::path::Path;
 
 /// Which flag names the readings of a file where no column does; where one does, what is wrong with its rows.
-pub(super) fn without_readings(file: &Path, looked: &FileSurvey) -> String {
+pub(super) fn without_readings(
+    file: &Path,
+    looked: &FileSurvey,
+    stated: &[(String, CovariateKind)],
+) -> String {
     let is_named = |(_, meaning): &(String, Meaning)| {
         matches!(meaning, Meaning::Reading { .. } | Meaning::Component { .. })
     };
@@ -37,10 +41,9 @@ pub(super) fn without_readings(file: &Path, looked: &FileSurvey) -> String {
             ),
         };
     }
-    let of_points = looked
-        .columns
-        .iter()
-        .filter(|(name, meaning)| numbers.contains(&name.as_str()) && !is_covariate(name, meaning));
+    let of_points = looked.columns.iter().filter(|(name, meaning)| {
+        numbers.contains(&name.as_str()) && !is_covariate(name, meaning, stated)
+    });
     let first = of_points.map(|(name, _)| name.as_str()).next();
     let first = first.unwrap_or("NAME");
     let stated = looked.units_line.get(first);
@@ -62,9 +65,10 @@ pub(super) fn without_readings(file: &Path, looked: &FileSurvey) -> String {
     format!(
         "{}: {named}; its columns of numbers are \
          {}: say which of them has the readings of which point, in which unit{in_which}, as in --column {example:?}; a UNIT is um, mm, cm, \
-         m, in or ft, or one of these per min, h, day or yr (mm_per_day): what is in another one must be converted first",
+         m, in or ft, or one of these per min, h, day or yr (mm_per_day): what is in another one must be converted first; a column of rain, of a lake or the like is named by --covariate {:?}",
         file.display(),
-        numbers.join(", ")
+        numbers.join(", "),
+        format!("{first}=level"),
     )
 }
 
@@ -82,7 +86,10 @@ pub(super) fn mostly_refused(file: &Path, looked: &FileSurvey) -> Option<String>
 }
 
 /// The covariates of a file, where it has numbers and each column of them is named as no reading is.
-pub(super) fn covariates_alone(looked: &FileSurvey) -> Option<Vec<String>> {
+pub(super) fn covariates_alone(
+    looked: &FileSurvey,
+    stated: &[(String, CovariateKind)],
+) -> Option<Vec<String>> {
     let numbers = looked
         .columns
         .iter()
@@ -90,13 +97,13 @@ pub(super) fn covariates_alone(looked: &FileSurvey) -> Option<Vec<String>> {
     let numbers: Vec<&(String, Meaning)> = numbers.collect();
     let are_all = numbers
         .iter()
-        .all(|(name, meaning)| is_covariate(name, meaning));
+        .all(|(name, meaning)| is_covariate(name, meaning, stated));
     let names = numbers.iter().map(|(name, _)| name.clone());
     (are_all && !numbers.is_empty()).then(|| names.collect())
 }
 
 /// Parts of the names of what acts on a slope, or on its instruments, in lower case.
-const OF_COVARIATES: [&str; 27] = [
+const OF_COVARIATES: [&str; 37] = [
     "rain",
     "regen",
     "niederschlag",
@@ -124,10 +131,23 @@ const OF_COVARIATES: [&str; 27] = [
     "discharge",
     "abfluss",
     "inflow",
+    "lake",
+    "lago",
+    "stausee",
+    "reservoir",
+    "embalse",
+    "stage",
+    "river",
+    "fluss",
+    "luft",
+    "melt",
 ];
 
-/// Whether a column's name, or the unit in it, says that it holds no readings.
-fn is_covariate(name: &str, meaning: &Meaning) -> bool {
+/// Whether a column's name, or the unit in it, says that it holds no readings, or it is `stated`.
+fn is_covariate(name: &str, meaning: &Meaning, stated: &[(String, CovariateKind)]) -> bool {
+    if stated.iter().any(|(column, _)| column == name) {
+        return true;
+    }
     let plain = name.to_lowercase();
     let is_levelling = plain.contains("levelling") || plain.contains("leveling");
     let of_covariates = OF_COVARIATES.iter().any(|part| plain.contains(part));

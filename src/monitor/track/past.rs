@@ -37,6 +37,14 @@ pub(in crate::monitor) struct PastReplay {
     /// Alerts since the level was last green: they are reported together when it is again, so that what is over never
     /// looks as if it were in force.
     episode: Vec<Event>,
+    /// Whether a reading that has been judged was corrected since, or one before it has come: it is begun again.
+    #[serde(default)]
+    is_stale: bool,
+    /// Up to when refits, and when alerts, were reported before it was begun again.
+    #[serde(default)]
+    reported: Option<Timestamp>,
+    #[serde(default)]
+    alerts_reported: Option<Timestamp>,
 }
 
 impl PastReplay {
@@ -44,9 +52,14 @@ impl PastReplay {
         self.track.record.benchmark()
     }
 
+    /// A reading of `time` has been taken: among those that have been judged, they are not what they were.
+    pub(in crate::monitor) fn note(&mut self, time: Timestamp) {
+        self.is_stale |= self.track.newest().is_some_and(|newest| time <= newest);
+    }
+
     /// Whether a refit of `time` is reported.
     fn reports(&mut self, time: Timestamp) -> bool {
-        if time >= self.until {
+        if time >= self.until || self.reported.is_some_and(|reported| time <= reported) {
             return false;
         }
         if self.until.duration_since(time) <= ALL_FOR {
@@ -143,6 +156,21 @@ impl Track {
             until,
             day: None,
             episode: Vec::new(),
+            is_stale: false,
+            reported: None,
+            alerts_reported: None,
+        }
+    }
+
+    /// The same begun again where readings of it have been corrected: what was reported is not reported again.
+    fn renewed(&self, walk: &mut PastReplay) {
+        if walk.is_stale {
+            *walk = PastReplay {
+                day: walk.day,
+                reported: walk.reported.max(walk.track.newest()),
+                alerts_reported: walk.alerts_reported,
+                ..self.past(walk.until)
+            };
         }
     }
 
@@ -153,6 +181,7 @@ impl Track {
         policy: &Policy,
         context: &StepContext<'_>,
     ) -> (Vec<Event>, bool) {
+        self.renewed(walk);
         let values = &self.record.observations().values;
         let from = walk
             .at_days
@@ -175,16 +204,22 @@ impl Track {
                     refits += 1;
                     events.extend(walk.reports(event.time).then_some(event));
                 } else if event.kind.is_of_the_record() {
-                    events.push(event);
+                    let is_new = walk.reported.is_none_or(|reported| event.time > reported);
+                    events.extend(is_new.then_some(event));
                 } else if is_of_a_level(&event) && event.time < walk.until {
                     walk.episode.push(event);
                 }
             }
             if walk.track.level() == Level::Green {
-                events.append(&mut walk.episode);
+                let reported = walk.alerts_reported;
+                walk.alerts_reported = reported.max(walk.episode.last().map(|event| event.time));
+                let is_new = |event: &Event| reported.is_none_or(|reported| event.time > reported);
+                events.extend(walk.episode.drain(..).filter(is_new));
             }
         }
-        (events, values.len() - from > MOST_READINGS)
+        // Half as it was and half corrected it does not go on.
+        walk.is_stale = self.pending.has_unjudged_late();
+        (events, walk.is_stale || values.len() - from > MOST_READINGS)
     }
 
     /// The past has been judged: goes on as it leads to. A level from there that has not ended is called.

@@ -271,14 +271,14 @@ impl Worker {
         self.report(waiting, outcome);
         if outcome == Some(&HookOutcome::Done) {
             self.finish(&waiting.alert, DeliveryOutcome::Delivered);
-        } else if self.is_left_out {
-            // What it was to get is closed already, and goes to the hooks that ask for it.
+        } else if !self.is_wanted(&waiting.alert) {
+            // It is closed already, and goes to the hooks that ask for it.
             tracing::warn!(
                 hook,
                 key,
                 attempt,
                 ?outcome,
-                "alert not delivered: the config has the hook no more"
+                "alert not delivered: by the config as it is now the hook does not ask for it"
             );
             locked(&self.queued).release(&waiting.alert);
         } else if self.is_over(&waiting.alert) {

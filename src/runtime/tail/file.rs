@@ -21,6 +21,8 @@ use std::time::Duration;
 const EARLIER_BYTES: u64 = 256 * 1024;
 /// How long an export may take to be written, and how soon a file is read from its start again for it.
 const WRITTEN: Duration = Duration::from_secs(2);
+/// After so long without a change the last line is taken for whole.
+const RESTED: Duration = Duration::from_secs(60);
 const ANEW_AGAIN: Duration = Duration::from_secs(600);
 /// Bytes of text that are read at once.
 const READ_BYTES: usize = 16 * 1024;
@@ -56,6 +58,8 @@ pub(super) struct FileTail {
     read_anew: Option<Stopwatch>,
     /// As of the last look that found nothing more; the file is opened only when it differs.
     pub(super) idle: Option<Glance>,
+    /// Runs since then.
+    idle_since: Option<Stopwatch>,
     /// When it was last written to, as of the last read.
     pub(super) modified: (i64, i64),
     /// When it was last written to, or came under its name, by the host's clock, as of the last look.
@@ -157,6 +161,7 @@ impl FileTail {
             other_since: None,
             read_anew: None,
             idle: None,
+            idle_since: None,
             modified: (0, 0),
             changed: None,
             pending: VecDeque::new(),
@@ -259,7 +264,7 @@ impl FileTail {
     fn advance(&mut self) -> io::Result<bool> {
         let glance = self.glance()?;
         if self.idle == Some(glance) {
-            return Ok(false);
+            return Ok(self.take_unended());
         }
         let file = self.open()?;
         self.is_restored = false;
@@ -317,7 +322,18 @@ impl FileTail {
         let suspect =
             matches!(self.content, Content::Mcap { suspect: Some(at), .. } if at == self.at);
         self.idle = (!moved && !suspect && self.other_since.is_none()).then_some(glance);
+        self.idle_since = self.idle.map(|_| Stopwatch::start());
         Ok(moved)
+    }
+
+    /// Takes the last line although nothing ends it, once whoever writes has had the time to go on.
+    fn take_unended(&mut self) -> bool {
+        let since = self.idle_since.map_or(Duration::ZERO, Stopwatch::elapsed);
+        let Content::Text(text) = &mut self.content else {
+            return false;
+        };
+        let line = (since >= WRITTEN).then(|| text.unended(since >= RESTED));
+        line.flatten().map(|line| self.take(line)).is_some()
     }
 
     /// Whether more has been packed into the file, under its name, since it was read whole.

@@ -1,10 +1,14 @@
-//! Cuts a growing text into lines: bytes in, whole lines out, a partial last one held.
+//! Cuts a growing text into lines: bytes in, whole lines out, a partial last one held; but where whoever writes ends each line only before the next
+//! one, or has written nothing for a while, the last one is whole too.
 
 use crate::runtime::ingest::{Transcoder, latin1};
 use serde::{Deserialize, Serialize};
 
 /// Longest line that is read, bytes.
 pub const LONGEST_LINE: usize = 64 * 1024;
+
+/// So many lines in a row are ended by what is written next before the last one counts as whole without its newline.
+const ENDED_LATER: u8 = 3;
 
 /// A whole line, without its newline.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,6 +47,15 @@ pub struct Lines {
     partial: Vec<u8>,
     too_long: bool,
     number: u64,
+    /// How many times in a row what was written next began by ending the line that was held.
+    #[serde(default)]
+    ended_later: u8,
+    /// Whether the line that is held has been returned.
+    #[serde(default)]
+    is_returned: bool,
+    /// Whether one that had been returned went on after all.
+    #[serde(default)]
+    was_cut: bool,
 }
 
 impl Lines {
@@ -53,7 +66,7 @@ impl Lines {
         }
         let bytes = self.transcoder.feed(bytes);
         let mut lines = Vec::new();
-        let mut rest = &bytes[..];
+        let mut rest = self.after_the_held(&bytes);
         while let Some(end) = rest.iter().position(|byte| *byte == b'\n') {
             self.hold(&rest[..end]);
             lines.push(self.complete());
@@ -61,6 +74,49 @@ impl Lines {
         }
         self.hold(rest);
         lines
+    }
+
+    /// What is to be read of `bytes` where the line that is held may have been returned. Where they do not end it, it was no whole line: it comes
+    /// again, with its rest.
+    fn after_the_held<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
+        let end = [&b"\n"[..], b"\r\n"].into_iter();
+        let end = end.filter(|_| !self.partial.is_empty());
+        let rest = end.filter_map(|end| bytes.strip_prefix(end)).next();
+        self.ended_later = match rest {
+            Some(_) => self.ended_later.saturating_add(1),
+            None => self.ended_later,
+        };
+        // Who writes a row with its end does not end it with the next one.
+        if rest.unwrap_or(bytes).ends_with(b"\n") {
+            self.ended_later = 0;
+        }
+        if bytes.is_empty() || !std::mem::take(&mut self.is_returned) {
+            return bytes;
+        }
+        match rest {
+            Some(rest) => {
+                self.partial.clear();
+                rest
+            }
+            None => {
+                self.number -= 1;
+                (self.was_cut, self.ended_later) = (true, 0);
+                bytes
+            }
+        }
+    }
+
+    /// The line that is held, where it is taken for whole although no newline follows it: `is_rested`, nothing has been written for a minute, and none
+    /// that was taken so went on after all; or whoever writes ends each line only before the next one.
+    pub fn unended(&mut self, is_rested: bool) -> Option<TailLine> {
+        let is_whole = self.ended_later >= ENDED_LATER || is_rested && !self.was_cut;
+        if !is_whole || self.is_returned || self.partial.is_empty() {
+            return None;
+        }
+        let held = self.partial.clone();
+        let line = self.complete();
+        (self.partial, self.is_returned) = (held, true);
+        Some(line)
     }
 
     /// The number of the last whole line.
@@ -75,7 +131,7 @@ impl Lines {
 
     /// Whether the text ends within a line.
     pub fn is_within_a_line(&self) -> bool {
-        self.too_long || !self.partial.is_empty()
+        self.too_long || !self.partial.is_empty() && !self.is_returned
     }
 
     fn hold(&mut self, bytes: &[u8]) {
@@ -145,6 +201,35 @@ mod tests {
             (line.number, line.text.unwrap().as_str()),
             (2, "2017-06-06,12.5")
         );
+    }
+
+    #[test]
+    fn a_last_line_is_whole_where_three_before_it_were_ended_by_what_came_next() {
+        let mut lines = Lines::default();
+        assert_eq!(texts(lines.feed(b"a\n1,2")), ["a"]);
+        for (next, ended) in [("\n2,3", "1,2"), ("\r\n3,4", "2,3")] {
+            assert_eq!(texts(lines.feed(next.as_bytes())), [ended]);
+            assert_eq!(lines.unended(false), None, "{next}");
+        }
+        assert_eq!(texts(lines.feed(b"\n4,5")), ["3,4"]);
+        let whole = lines.unended(false).unwrap();
+        assert_eq!((whole.number, whole.text.as_deref()), (5, Ok("4,5")));
+        assert!(lines.unended(false).is_none() && !lines.is_within_a_line());
+        // It was returned; what comes next is the sixth line.
+        assert!(lines.feed(b"\n5,6").is_empty());
+        assert_eq!(lines.unended(false).unwrap().number, 6);
+        // It had not been whole: it comes again.
+        assert!(lines.feed(b"7").is_empty());
+        assert_eq!(lines.unended(false), None, "no more");
+        let again = lines.feed(b"8\n").remove(0);
+        assert_eq!((again.number, again.text.as_deref()), (6, Ok("5,678")));
+        assert_eq!(lines.feed(b"6,7\n").remove(0).number, 7);
+        lines.feed(b"7,8");
+        assert_eq!(lines.unended(true), None, "one that was taken had been cut");
+        let mut export = Lines::default();
+        export.feed(b"a\n1,2");
+        assert_eq!(export.unended(false), None);
+        assert_eq!(export.unended(true).unwrap().number, 2);
     }
 
     #[test]

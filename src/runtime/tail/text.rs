@@ -1,6 +1,6 @@
 //! The text of one file on its way in: bytes to lines, lines to values and faults.
 
-use super::lines::{LineFault, Lines};
+use super::lines::{LineFault, Lines, TailLine};
 use crate::reading::Quantity;
 use crate::runtime::ingest::{FileUnits, IngestError, Item, Meaning, Remark, TextRows, unpack};
 use serde::{Deserialize, Serialize};
@@ -94,24 +94,7 @@ impl TextReader {
     pub(in crate::runtime) fn feed(&mut self, bytes: &[u8]) -> LinesRead {
         let mut fed = LinesRead::default();
         for line in self.lines.feed(bytes) {
-            let number = line.number;
-            let (text, error) = match line.text {
-                Err(LineFault::NotUtf8 {
-                    latin1: Some(text), ..
-                }) if self.rows.takes_latin1() => {
-                    fed.remarks.push(Remark::latin1(number));
-                    self.line(number, text, &mut fed)
-                }
-                Err(fault) => (String::new(), Some(fault.into())),
-                Ok(text) => self.line(number, text, &mut fed),
-            };
-            let Some(error) = error else { continue };
-            fed.is_lost = !text.is_empty() && self.rows.is_lost();
-            fed.bad.push(BadLine {
-                number,
-                text,
-                error,
-            });
+            self.take_line(line, &mut fed);
             if fed.is_lost {
                 break;
             }
@@ -126,6 +109,37 @@ impl TextReader {
             fed.remarks.push(Remark::utf16());
         }
         fed
+    }
+
+    /// The last line, where it is taken for whole although nothing ends it ([`Lines::unended`]).
+    pub(super) fn unended(&mut self, is_rested: bool) -> Option<LinesRead> {
+        let line = self.lines.unended(is_rested)?;
+        let mut fed = LinesRead::default();
+        self.take_line(line, &mut fed);
+        fed.items
+            .sort_by(|(_, one), (_, next)| order(one).cmp(&order(next)));
+        Some(fed)
+    }
+
+    fn take_line(&mut self, line: TailLine, fed: &mut LinesRead) {
+        let number = line.number;
+        let (text, error) = match line.text {
+            Err(LineFault::NotUtf8 {
+                latin1: Some(text), ..
+            }) if self.rows.takes_latin1() => {
+                fed.remarks.push(Remark::latin1(number));
+                self.line(number, text, fed)
+            }
+            Err(fault) => (String::new(), Some(fault.into())),
+            Ok(text) => self.line(number, text, fed),
+        };
+        let Some(error) = error else { return };
+        fed.is_lost = !text.is_empty() && self.rows.is_lost();
+        fed.bad.push(BadLine {
+            number,
+            text,
+            error,
+        });
     }
 
     fn line(

@@ -194,7 +194,7 @@ impl SiteReader {
         let unknown_since = unknown.first().map(|(_, event)| event.time);
         let mut standing = Standing {
             level: highest.map_or(Level::Green, |((_, level), _)| *level),
-            since: highest.map(|(_, event)| event.time),
+            since: highest.map(|(_, event)| event.in_force_since()),
             is_unknown: newest.is_none() || unknown_since.is_some(),
             unknown_since,
             newest_reading: newest,

@@ -1,7 +1,7 @@
 // The site: every benchmark by level, where each stands, what is in force.
 
 import { get } from '/page/ask.js';
-import { badge, badges, collapse, el, figure, left, list, outlookChance, place, redChance, shape, span, svg, described, when } from '/page/words.js';
+import { badge, badges, collapse, el, figure, left, list, local, outlookChance, place, redChance, shape, span, svg, described, when } from '/page/words.js';
 
 const RANK = { green: 0, unknown: 0.5, yellow: 1, orange: 2, red: 3 };
 const HEALTH = [
@@ -57,11 +57,12 @@ export class SitePage {
   }
 
   force(site, at) {
-    const alerts = site.alerts.filter((alert) => alert.benchmark);
+    // The gravest first: the list is as high as a screen at most.
+    const alerts = site.alerts.filter((alert) => alert.benchmark).sort((a, b) => RANK[b.level] - RANK[a.level]);
     const items = alerts.map((alert) => {
       const seen = site.acknowledged_by[alert.key];
       return el('li', {}, badge(alert.level), ' ', el('a', { href: place(alert.benchmark) }, alert.benchmark), ' since ', when(alert.time),
-        el('div', {}, alert.text),
+        el('div', {}, ...local(alert.text)),
         seen ? el('div', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'} at `, when(seen.time)) : null);
     });
     const quiet = site.silences.map((one) => el('li', {}, `${one.benchmark ?? 'the whole site'}: ${described(one)}`));

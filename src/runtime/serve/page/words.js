@@ -75,6 +75,11 @@ export function when(time) {
   return el('time', { datetime: time, title: time }, minute(time));
 }
 
+/** A text, its times in UTC by the site's clocks. */
+export function local(text) {
+  return text.split(/(\d{4}-\d\d-\d\dT\d\d:\d\d(?::\d\d(?:\.\d+)?)?Z)/).map((part, index) => (index % 2 ? when(part) : part));
+}
+
 /** 3 d 4 h. */
 export function span(seconds) {
   const steps = [[86400, 'd'], [3600, 'h'], [60, 'min']];
