@@ -86,7 +86,7 @@ impl Dispatcher {
                 abort.abort();
             }
         });
-        self.leaving.retain_mut(|one| one.is_at_work());
+        self.leaving.retain_mut(LeavingWorker::is_at_work);
         self.leaving.push(LeavingWorker { name, ended });
     }
 }

@@ -79,13 +79,11 @@ impl Lines {
     /// What is to be read of `bytes` where the line that is held may have been returned. Where they do not end it, it was no whole line: it comes
     /// again, with its rest.
     fn after_the_held<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
-        let end = [&b"\n"[..], b"\r\n"].into_iter();
-        let end = end.filter(|_| !self.partial.is_empty());
-        let rest = end.filter_map(|end| bytes.strip_prefix(end)).next();
-        self.ended_later = match rest {
-            Some(_) => self.ended_later.saturating_add(1),
-            None => self.ended_later,
-        };
+        let mut end = [&b"\n"[..], b"\r\n"].into_iter();
+        let rest = end.find_map(|end| bytes.strip_prefix(end));
+        let rest = rest.filter(|_| !self.partial.is_empty());
+        let ends_one = u8::from(rest.is_some());
+        self.ended_later = self.ended_later.saturating_add(ends_one);
         // Who writes a row with its end does not end it with the next one.
         if rest.unwrap_or(bytes).ends_with(b"\n") {
             self.ended_later = 0;
@@ -93,17 +91,13 @@ impl Lines {
         if bytes.is_empty() || !std::mem::take(&mut self.is_returned) {
             return bytes;
         }
-        match rest {
-            Some(rest) => {
-                self.partial.clear();
-                rest
-            }
-            None => {
-                self.number -= 1;
-                (self.was_cut, self.ended_later) = (true, 0);
-                bytes
-            }
+        if let Some(rest) = rest {
+            self.partial.clear();
+            return rest;
         }
+        self.number -= 1;
+        (self.was_cut, self.ended_later) = (true, 0);
+        bytes
     }
 
     /// The line that is held, where it is taken for whole although no newline follows it: `is_rested`, nothing has been written for a minute, and none
