@@ -80,6 +80,8 @@ pub(super) fn explained_by(
     let critical = options.critical_velocity_mm_per_day;
     let forecast = forecast_change(series, channels, &findings.known_load, critical);
     let of_channels = remarks::of_channels(series, channels);
+    let effects = [&findings.verdict].into_iter().chain(&findings.also);
+    let of_jumps: Vec<String> = remarks::of_forward_jumps(effects).collect();
     let remarks = inspected.remarks.into_iter();
     Explanation {
         benchmark: series.benchmark.clone(),
@@ -102,6 +104,7 @@ pub(super) fn explained_by(
             .chain(copies.iter().map(ChannelCopy::remark))
             .chain(of_channels)
             .chain(of_search)
+            .chain(of_jumps)
             .collect(),
         residual: findings.residual,
         noise: findings.noise,

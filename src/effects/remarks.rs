@@ -1,5 +1,7 @@
 //! Sentences for people on where a covariate and the velocity part ways.
 
+use super::explanation::Effect;
+use super::kind::Kind;
 use crate::reading::{Channel, Quantity, Sample, Series, Timestamp, days_since};
 use jiff::SignedDuration;
 
@@ -26,6 +28,26 @@ pub fn of_channels(series: &Series, channels: &[Channel]) -> Vec<String> {
         .iter()
         .filter_map(|channel| parting(&velocities, channel))
         .collect()
+}
+
+/// What a person should know of jumps of the reading along the motion that do not come back: slip of the slope looks the same.
+pub(super) fn of_forward_jumps<'a>(
+    effects: impl Iterator<Item = &'a Effect> + Clone,
+) -> impl Iterator<Item = String> {
+    let jumps = effects.filter(|one| one.effect == Kind::OFFSET);
+    let sizes: Vec<(Option<Timestamp>, f64)> =
+        (jumps.clone().filter_map(|one| Some((one.at, one.size?)))).collect();
+    let comes_back = move |of: f64| sizes.iter().any(|(_, size)| *size < -0.5 * of);
+    jumps.filter_map(move |one| {
+        let size = one.size.filter(|size| *size > 0.0 && !comes_back(*size))?;
+        Some(format!(
+            "The offset of {} {} at {} is along the motion: slip of the slope within that time looks the same. A point beside it, or \
+             the instrument, shows which it was.",
+            figure(size),
+            one.unit.as_deref().unwrap_or_default(),
+            one.at?
+        ))
+    })
 }
 
 /// When, and mm/day.
@@ -266,6 +288,21 @@ mod tests {
         let spikes: Vec<f64> = (0..40).map(|day| f64::from(day * 17 % 5)).collect();
         let turn = last_turn(&samples(&spikes));
         assert!(turn.is_none_or(|turn| turn.until - turn.at < FEWEST));
+    }
+
+    #[test]
+    fn a_jump_along_the_motion_that_does_not_come_back_may_be_slip() {
+        let jump = |size: f64| Effect {
+            at: Some("2014-02-15T00:00:00Z".parse().unwrap()),
+            size: Some(size),
+            unit: Some("mm".to_owned()),
+            ..Effect::of(Kind::OFFSET)
+        };
+        let said =
+            |effects: &[Effect]| -> Vec<String> { of_forward_jumps(effects.iter()).collect() };
+        assert_eq!(said(&[jump(235.0)]).len(), 1);
+        assert!(said(&[jump(235.0), jump(-230.0)]).is_empty());
+        assert!(said(&[jump(-36.0), Effect::of(Kind::STATE_RESET)]).is_empty());
     }
 
     #[test]

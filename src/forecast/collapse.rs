@@ -66,9 +66,6 @@ const SOONER: f64 = 1.2;
 /// The share of the chance by the readings since an event that counts for levels: most events are followed by others of their
 /// kind. Set on simulated slopes: the whole of it calls a tenth more reds on those that stand.
 const LATER: f64 = 0.6;
-/// The daily wave and the pace are known from so many days on; before, what the network says counts in part as levels have it. Of 8,884 forecasts then on slopes
-/// drawn by another hand 671 gave a collapse within two days over .2 where levels went by under .02; later 64 of 118,966.
-const DAYS_TO_KNOW: f64 = 2.0;
 /// Readings since an event that are judged by themselves, at least and at most: the work is bounded.
 const FEWEST_LATER: usize = 24;
 const MOST_LATER: usize = 200_000;
@@ -194,9 +191,7 @@ impl Indicators {
         // A relation that puts the collapse later takes nothing from what levels go by: a slope collapses at a finite velocity, before that
         // relation ends. Straight lines that agree with the law end when slopes collapse.
         let least = Passage::default().pooled(&sure, 1.0 - agreed);
-        let known = (self.scales.length_days / DAYS_TO_KNOW).min(1.0);
-        let timed = sure.pooled(&members.timed(&all, agreed), known);
-        let expected = timed.at_least(&least);
+        let expected = members.timed(&all, agreed).at_least(&least);
         Collapse {
             passage: Self::sooner(&expected, members.is_timed(agreed)).at_least(&least),
             expected,
@@ -320,12 +315,17 @@ fn is_fast(scales: &Scales, power: usize) -> f64 {
     1.0 / (1.0 + (SLOW / fastest).powi(4))
 }
 
-/// The share of the chance within such a span that is reported of a slope that may creep steadily, all scales together: what an even chance becomes by
-/// their likelihood ratio, if under 1, over one half.
+/// The share of the chance within such a span that is reported of a slope that may creep steadily: all scales
+/// count together.
 fn may_grow(scales: &Scales, power: usize, span: f64) -> f64 {
     let each = growth(scales, power, span).map(|ln| ln.min(ONE_SCALE));
-    let ratio = each.sum::<f64>().min(0.0).exp();
-    STEADY + (1.0 - STEADY) * (2.0 * ratio / (1.0 + ratio))
+    STEADY + (1.0 - STEADY) * share(each.sum())
+}
+
+/// What an even chance becomes by a likelihood ratio under 1, over one half.
+fn share(ln_ratio: f64) -> f64 {
+    let ratio = ln_ratio.min(0.0).exp();
+    2.0 * ratio / (1.0 + ratio)
 }
 
 /// ln of the likelihood ratio of growth against none, at the scale `power`, whose span is `span` days, and each shorter one. A

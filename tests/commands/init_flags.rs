@@ -159,7 +159,7 @@ fn a_file_of_covariates_alone_goes_beside_one_with_readings() {
     ];
     let (exit, out, err) = office.say(&stated);
     assert!(
-        exit == 0 && out.contains("covariate lower (level): 60 values"),
+        exit == 0 && out.contains("level, as the config states"),
         "{out}{err}"
     );
     let both = rows(60, |time, value| format!("{time}+02:00,0.2,{value}\n"));

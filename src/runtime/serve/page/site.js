@@ -40,7 +40,7 @@ export class SitePage {
         sketch(sorted, site.positions_are),
         el('section', { class: 'card' }, el('h2', {}, 'In force'), this.force(site, at))),
       ...(at || !status.drill ? [] : [drills(status.drill)]),
-      el('section', { class: 'card' }, el('h2', {}, 'What was said'), list(site.log, 'Nothing yet.')));
+      el('section', { class: 'card' }, el('h2', {}, 'Newest events'), list(site.log, 'Nothing yet.')));
     const log = this.view.querySelector('ul.log');
     if (log) log.scrollTop = scrolled;
   }

@@ -198,7 +198,7 @@ export function list(events, none, own = null) {
   return el('ul', { class: 'log', tabindex: '0' }, events.map((event) => el('li', {},
     when(event.time),
     event.benchmark === own && own !== null ? null : event.benchmark ? el('a', { href: place(event.benchmark) }, event.benchmark) : el('span', {}, 'site'),
-    ' ', event.event === 'alert' && event.state === 'firing' ? badge(event.level) : null, ' ', described(event))));
+    ' ', event.event === 'alert' && event.state === 'firing' ? badge(event.level) : null, ' ', ...local(described(event)))));
 }
 
 let moment = null;
