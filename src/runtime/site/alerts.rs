@@ -167,8 +167,8 @@ impl Site {
         self.is_full
     }
 
-    /// Notifies `hooks` from here on, first what some hook has not taken yet; those that are in the config already go on. See
-    /// [`Dispatcher::change_hooks`](crate::runtime::deliver::Dispatcher::change_hooks).
+    /// Notifies `hooks` from here on, first what some hook has not taken yet; those that are in the config already go on. Where
+    /// `is_reread`, each is set up anew; one that is left out ends what it runs within `limit`.
     ///
     /// # Errors
     /// When the state cannot be read.
