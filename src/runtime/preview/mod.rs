@@ -235,7 +235,7 @@ impl PreviewSoFar {
         if text.is_within_a_line() && self.values <= MOST_VALUES {
             let file = file.display();
             view.remarks.push(format!(
-                "{file}: its last line has no line break: a daemon reads it once it has one, or a minute after it was written"
+                "{file}: its last line has no line break, and is read once it has one; after three rows that were ended only with the next one, at once"
             ));
         }
         let meant = |(name, meaning)| (name, decoder.meant(meaning));

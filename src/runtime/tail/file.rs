@@ -21,8 +21,6 @@ use std::time::Duration;
 const EARLIER_BYTES: u64 = 256 * 1024;
 /// How long an export may take to be written, and how soon a file is read from its start again for it.
 const WRITTEN: Duration = Duration::from_secs(2);
-/// After so long without a change the last line is taken for whole.
-const RESTED: Duration = Duration::from_secs(60);
 const ANEW_AGAIN: Duration = Duration::from_secs(600);
 /// Bytes of text that are read at once.
 const READ_BYTES: usize = 16 * 1024;
@@ -332,7 +330,7 @@ impl FileTail {
         let Content::Text(text) = &mut self.content else {
             return false;
         };
-        let line = (since >= WRITTEN).then(|| text.unended(since >= RESTED));
+        let line = (since >= WRITTEN).then(|| text.unended());
         line.flatten().map(|line| self.take(line)).is_some()
     }
 

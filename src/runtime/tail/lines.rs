@@ -1,5 +1,5 @@
 //! Cuts a growing text into lines: bytes in, whole lines out, a partial last one held; but where whoever writes ends each line only before the next
-//! one, or has written nothing for a while, the last one is whole too.
+//! one, the last one is whole too.
 
 use crate::runtime::ingest::{Transcoder, latin1};
 use serde::{Deserialize, Serialize};
@@ -53,9 +53,6 @@ pub struct Lines {
     /// Whether the line that is held has been returned.
     #[serde(default)]
     is_returned: bool,
-    /// Whether one that had been returned went on after all.
-    #[serde(default)]
-    was_cut: bool,
 }
 
 impl Lines {
@@ -96,15 +93,14 @@ impl Lines {
             return rest;
         }
         self.number -= 1;
-        (self.was_cut, self.ended_later) = (true, 0);
+        self.ended_later = 0;
         bytes
     }
 
-    /// The line that is held, where it is taken for whole although no newline follows it: `is_rested`, nothing has been written for a minute, and none
-    /// that was taken so went on after all; or whoever writes ends each line only before the next one.
-    pub fn unended(&mut self, is_rested: bool) -> Option<TailLine> {
-        let is_whole = self.ended_later >= ENDED_LATER || is_rested && !self.was_cut;
-        if !is_whole || self.is_returned || self.partial.is_empty() {
+    /// The line that is held, where it is whole although no newline follows it: whoever writes ends each line only before the next one, and has
+    /// written nothing for some time.
+    pub fn unended(&mut self) -> Option<TailLine> {
+        if self.ended_later < ENDED_LATER || self.is_returned || self.partial.is_empty() {
             return None;
         }
         let held = self.partial.clone();
@@ -203,27 +199,21 @@ mod tests {
         assert_eq!(texts(lines.feed(b"a\n1,2")), ["a"]);
         for (next, ended) in [("\n2,3", "1,2"), ("\r\n3,4", "2,3")] {
             assert_eq!(texts(lines.feed(next.as_bytes())), [ended]);
-            assert_eq!(lines.unended(false), None, "{next}");
+            assert_eq!(lines.unended(), None, "{next}");
         }
         assert_eq!(texts(lines.feed(b"\n4,5")), ["3,4"]);
-        let whole = lines.unended(false).unwrap();
+        let whole = lines.unended().unwrap();
         assert_eq!((whole.number, whole.text.as_deref()), (5, Ok("4,5")));
-        assert!(lines.unended(false).is_none() && !lines.is_within_a_line());
+        assert!(lines.unended().is_none() && !lines.is_within_a_line());
         // It was returned; what comes next is the sixth line.
         assert!(lines.feed(b"\n5,6").is_empty());
-        assert_eq!(lines.unended(false).unwrap().number, 6);
+        assert_eq!(lines.unended().unwrap().number, 6);
         // It had not been whole: it comes again.
         assert!(lines.feed(b"7").is_empty());
-        assert_eq!(lines.unended(false), None, "no more");
+        assert_eq!(lines.unended(), None, "no more");
         let again = lines.feed(b"8\n").remove(0);
         assert_eq!((again.number, again.text.as_deref()), (6, Ok("5,678")));
         assert_eq!(lines.feed(b"6,7\n").remove(0).number, 7);
-        lines.feed(b"7,8");
-        assert_eq!(lines.unended(true), None, "one that was taken had been cut");
-        let mut export = Lines::default();
-        export.feed(b"a\n1,2");
-        assert_eq!(export.unended(false), None);
-        assert_eq!(export.unended(true).unwrap().number, 2);
     }
 
     #[test]

@@ -112,8 +112,8 @@ impl TextReader {
     }
 
     /// The last line, where it is taken for whole although nothing ends it ([`Lines::unended`]).
-    pub(super) fn unended(&mut self, is_rested: bool) -> Option<LinesRead> {
-        let line = self.lines.unended(is_rested)?;
+    pub(super) fn unended(&mut self) -> Option<LinesRead> {
+        let line = self.lines.unended()?;
         let mut fed = LinesRead::default();
         self.take_line(line, &mut fed);
         fed.items
