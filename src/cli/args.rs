@@ -235,9 +235,9 @@ pub struct ReadingArgs {
     /// Covariates that stand in a file of their own
     #[arg(long, value_name = "FILE")]
     pub channels: Vec<PathBuf>,
-    /// What a covariate measures whose name does not say it: rain, flow, level, temperature, humidity, pressure or other
-    #[arg(long = "covariate", value_name = "NAME=KIND", value_parser = stated)]
-    pub stated: Vec<(String, CovariateKind)>,
+    /// Covariates whose names do not say what they measure.
+    #[command(flatten)]
+    pub covariates: CovariateArgs,
     /// The meaning of the files.
     #[command(flatten)]
     pub file: FileArgs,
@@ -247,6 +247,14 @@ pub struct ReadingArgs {
     /// Passing this velocity is failure, such as "1 m/day"
     #[arg(long, value_name = "VELOCITY", value_parser = value::speed)]
     pub critical_velocity: Option<f64>,
+}
+
+/// Covariates whose names do not say what they measure.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub struct CovariateArgs {
+    /// What a covariate measures whose name does not say it: rain, flow, level, temperature, humidity, pressure or other
+    #[arg(long = "covariate", value_name = "NAME=KIND", value_parser = stated)]
+    pub stated: Vec<(String, CovariateKind)>,
 }
 
 /// What the files hold.
@@ -308,7 +316,7 @@ impl ReadingArgs {
     /// Puts to the covariates what is stated of them.
     fn state(&self, recording: &mut Recording) -> Result<(), IngestError> {
         let channels = &mut recording.channels;
-        for (name, kind) in &self.stated {
+        for (name, kind) in &self.covariates.stated {
             let Some(channel) = channels.iter_mut().find(|one| one.name == *name) else {
                 return Err(IngestError::NoSuchCovariate {
                     name: name.clone(),
@@ -447,7 +455,7 @@ pub(super) fn warn_of(disorder: Disorder) {
 }
 
 /// A column's name may hold `=`.
-pub(super) fn stated(text: &str) -> Result<(String, CovariateKind), String> {
+fn stated(text: &str) -> Result<(String, CovariateKind), String> {
     let parts = text.rsplit_once('=').filter(|(name, _)| !name.is_empty());
     let (name, kind) = parts.ok_or("write NAME=KIND, such as Nied_1h=rain")?;
     Ok((name.to_owned(), CovariateKind::parse(kind)?))

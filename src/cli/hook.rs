@@ -3,7 +3,7 @@
 use super::args::{OutputArgs, OutputFormat};
 use super::run::asynchronous;
 use crate::alert::Level;
-use crate::config::{self, Config, HookConfig};
+use crate::config::{self, ADD_HOOK, Config, HookConfig, NO_HOOK};
 use crate::monitor::{AlertState, Event, EventKind};
 use crate::reading::Timestamp;
 use crate::runtime::clock;
@@ -53,9 +53,7 @@ pub(super) struct Exec {
 #[derive(Debug, thiserror::Error)]
 enum Failed {
     /// The config has none.
-    #[error(
-        "the config has no [[hook]]: nobody is notified of an alert; add one with run = [\"./notify.sh\"]"
-    )]
+    #[error("{NO_HOOK}; {ADD_HOOK}")]
     NoHook,
     /// No hook would be run.
     #[error("no hook asks for {0}")]
@@ -106,15 +104,15 @@ fn test(args: &Test) -> anyhow::Result<()> {
     });
     let mut config = config::load(&args.config)?;
     config.sandbox_hooks(Path::new(OURSELVES));
+    if config.hooks.is_empty() {
+        return Err(Failed::NoHook.into());
+    }
     let now = clock::now();
     let asked: Vec<(&HookConfig, Level)> = config
         .hooks
         .iter()
         .filter_map(|hook| Some((hook, of_hook(hook, args.level)?)))
         .collect();
-    if config.hooks.is_empty() {
-        return Err(Failed::NoHook.into());
-    }
     if asked.is_empty() {
         let level = args.level.map_or("any level", Level::name);
         return Err(Failed::None(level.to_owned()).into());

@@ -6,6 +6,11 @@ use super::{HookConfig, cap, mqtt_out, webhook};
 use std::collections::BTreeSet;
 use std::path::Path;
 
+/// What is said where nobody is notified.
+pub const NO_HOOK: &str = "there is no [[hook]]: nobody is notified of an alert";
+/// What to do then.
+pub const ADD_HOOK: &str = "add [[hook]] with run = [\"./notify.sh\"]";
+
 /// Reads one table of the config; the set has what the ways out before it are called.
 type ReadWayOut = fn(Section<'_>, &Path, &mut BTreeSet<String>) -> Option<HookConfig>;
 
@@ -36,11 +41,7 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
     unlike(root, &hooks);
     let mut tables = std::iter::once("hook").chain(way_out_tables());
     if hooks.is_empty() && tables.all(|table| !root.has(table)) {
-        root.warning(
-            root.at(),
-            "there is no [[hook]]: nobody is notified of an alert".to_owned(),
-            "add [[hook]] with run = [\"./notify.sh\"]",
-        );
+        root.warning(root.at(), NO_HOOK.to_owned(), ADD_HOOK);
     }
     hooks
 }

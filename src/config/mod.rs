@@ -38,7 +38,7 @@ pub use destination::{Destination, SharedDestination};
 pub use drill::{Drill, EXERCISE};
 pub use duty::DutyHours;
 pub use heartbeat::Heartbeat;
-pub use hook::way_out_tables;
+pub use hook::{ADD_HOOK, NO_HOOK, way_out_tables};
 pub use keys::{Key, Keys, ValueShape};
 pub use link::Links;
 pub use mqtt_out::MqttTopic;

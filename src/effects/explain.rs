@@ -80,9 +80,8 @@ pub(super) fn explained_by(
     let critical = options.critical_velocity_mm_per_day;
     let forecast = forecast_change(series, channels, &findings.known_load, critical);
     let of_channels = remarks::of_channels(series, channels);
-    let effects = [&findings.verdict].into_iter().chain(&findings.also);
-    let of_jumps: Vec<String> = remarks::of_forward_jumps(effects).collect();
     let remarks = inspected.remarks.into_iter();
+    let of_jumps = remarks::of_forward_jumps(findings.effects());
     Explanation {
         benchmark: series.benchmark.clone(),
         quantity: series.quantity(),
@@ -129,9 +128,7 @@ fn by_own_event(
     neighbours: &[&Series],
     options: &Options,
 ) -> (Option<Effect>, Option<Candidate>) {
-    let effects: Vec<&Effect> = std::iter::once(&findings.verdict)
-        .chain(&findings.also)
-        .collect();
+    let effects: Vec<&Effect> = findings.effects().collect();
     if let Some(partition) = &mut found {
         let within = |at: Timestamp| {
             let interval = partition.at_interval;

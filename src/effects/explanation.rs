@@ -106,6 +106,13 @@ pub struct Effect {
     pub contribution_rms: Option<f64>,
 }
 
+impl Explanation {
+    /// The verdict, and what stands beside it.
+    pub fn effects(&self) -> impl Iterator<Item = &Effect> + Clone {
+        [&self.verdict].into_iter().chain(&self.also)
+    }
+}
+
 impl Effect {
     /// An effect of that kind of which nothing more is known yet.
     pub fn of(kind: Kind) -> Self {

@@ -51,6 +51,11 @@ pub(super) struct Findings {
 }
 
 impl Findings {
+    /// The verdict, and what stands beside it.
+    pub(super) fn effects(&self) -> impl Iterator<Item = &Effect> + Clone {
+        [&self.verdict].into_iter().chain(&self.also)
+    }
+
     /// Where there was nothing to search, or no law to start from.
     pub(super) fn none(unit: Unit) -> Self {
         Self {

@@ -8,7 +8,7 @@ use super::search::SIGNIFICANT;
 /// A sentence for each effect of a covariate that its other form explains as well: by less than `margin` of the BIC apart, and not
 /// refused before a later block was asked.
 pub(super) fn left_open(findings: &Findings, margin: f64) -> Vec<String> {
-    let effects = std::iter::once(&findings.verdict).chain(&findings.also);
+    let effects = findings.effects();
     let sentences = effects.filter_map(|effect| {
         let mut others = findings.candidates.iter();
         let other = others.find(|one| is_other_form(effect, one, margin))?;

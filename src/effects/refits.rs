@@ -448,13 +448,13 @@ impl Refitted {
     }
 }
 
-/// Whether a term makes one large innovation of the reading, or, where the noise remembers, of the velocity.
 /// Whether it is an event of the ground beside effects that were found without it: these have taken up what they could of it, by their sizes, their delays and
 /// the law.
 fn is_event_beside(base: &Fitted, term: &Term) -> bool {
     !base.terms.is_empty() && term.kind.is_event_of_the_ground()
 }
 
+/// Whether a term makes one large innovation of the reading, or, where the noise remembers, of the velocity.
 fn is_jump(term: &Term, frames: &Frames) -> bool {
     term.is_jump_of_reading() || (term.kind.jumps() && frames.remembers())
 }

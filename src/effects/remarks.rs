@@ -1,4 +1,4 @@
-//! Sentences for people on where a covariate and the velocity part ways.
+//! Sentences for people on where a covariate and the velocity part ways, and on what may be slip.
 
 use super::explanation::Effect;
 use super::kind::Kind;
@@ -33,12 +33,11 @@ pub fn of_channels(series: &Series, channels: &[Channel]) -> Vec<String> {
 /// What a person should know of jumps of the reading along the motion that do not come back: slip of the slope looks the same.
 pub(super) fn of_forward_jumps<'a>(
     effects: impl Iterator<Item = &'a Effect> + Clone,
-) -> impl Iterator<Item = String> {
+) -> Vec<String> {
     let jumps = effects.filter(|one| one.effect == Kind::OFFSET);
-    let sizes: Vec<(Option<Timestamp>, f64)> =
-        (jumps.clone().filter_map(|one| Some((one.at, one.size?)))).collect();
-    let comes_back = move |of: f64| sizes.iter().any(|(_, size)| *size < -0.5 * of);
-    jumps.filter_map(move |one| {
+    let sizes: Vec<f64> = jumps.clone().filter_map(|one| one.size).collect();
+    let comes_back = |of: f64| sizes.iter().any(|size| *size < -0.5 * of);
+    let said = jumps.filter_map(|one| {
         let size = one.size.filter(|size| *size > 0.0 && !comes_back(*size))?;
         Some(format!(
             "The offset of {} {} at {} is along the motion: slip of the slope within that time looks the same. A point beside it, or \
@@ -47,7 +46,8 @@ pub(super) fn of_forward_jumps<'a>(
             one.unit.as_deref().unwrap_or_default(),
             one.at?
         ))
-    })
+    });
+    said.collect()
 }
 
 /// When, and mm/day.
@@ -298,8 +298,7 @@ mod tests {
             unit: Some("mm".to_owned()),
             ..Effect::of(Kind::OFFSET)
         };
-        let said =
-            |effects: &[Effect]| -> Vec<String> { of_forward_jumps(effects.iter()).collect() };
+        let said = |effects: &[Effect]| of_forward_jumps(effects.iter());
         assert_eq!(said(&[jump(235.0)]).len(), 1);
         assert!(said(&[jump(235.0), jump(-230.0)]).is_empty());
         assert!(said(&[jump(-36.0), Effect::of(Kind::STATE_RESET)]).is_empty());

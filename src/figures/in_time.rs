@@ -192,8 +192,9 @@ fn behind(explanation: &Explanation) -> Vec<(String, Mark)> {
         marks.push((String::new(), block));
     }
     let faults = explanation.faults.iter().map(|fault| day(fault.at));
-    let effects = [&explanation.verdict].into_iter().chain(&explanation.also);
-    let effects = effects.filter_map(|effect: &Effect| effect.at.map(day));
+    let effects = explanation
+        .effects()
+        .filter_map(|effect: &Effect| effect.at.map(day));
     let uprights = [
         ("fault", faults.collect::<Vec<_>>(), PURPLE, DOTTED),
         ("effect", effects.collect(), GREEN, DASHED),

@@ -395,3 +395,8 @@ impl Summary {
         }
     }
 }
+
+/// Since when the alert of this key is in force: its end.
+pub fn since_by_key(key: &str) -> Option<Timestamp> {
+    key.rsplit_once('/')?.1.parse().ok()
+}

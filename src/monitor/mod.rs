@@ -42,7 +42,7 @@ pub use declared::{Declaration, Declared};
 pub use event::{
     AlertState, CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime, InverseVelocity,
     LevelChance, Plain, REMOVED, RESET_FOUND, RegimeReport, SUSPECT, SUSPECT_ENDS, SharedFailure,
-    Summary, Unexplained,
+    Summary, Unexplained, since_by_key,
 };
 pub use event_shown::KindShown;
 pub use given::{Given, OrderKind, OrderedBy};

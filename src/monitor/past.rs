@@ -4,7 +4,7 @@
 use super::Input;
 use super::Monitor;
 use super::batches::count_refits;
-use super::event::{Event, EventKind};
+use super::event::{Event, EventKind, since_by_key};
 use super::notice::Notice;
 use super::track::{PAST, PastReplay};
 use crate::alert::Level;
@@ -100,10 +100,8 @@ impl Event {
         let EventKind::Alert { key, rule, .. } = &self.kind else {
             return self.time;
         };
-        let since = key.rsplit('/').next().filter(|_| rule == PAST);
-        since
-            .and_then(|since| since.parse().ok())
-            .unwrap_or(self.time)
+        let since = since_by_key(key).filter(|_| rule == PAST);
+        since.unwrap_or(self.time)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::hook::{Alert, MessageState};
 use crate::alert::Level;
-use crate::monitor::EventKind;
+use crate::monitor::{EventKind, since_by_key};
 use crate::reading::{BEFORE_ALL, BenchmarkId, TimeSpan, Timestamp};
 use jiff::SignedDuration;
 use serde_json::json;
@@ -85,8 +85,7 @@ fn entry(
     })
 }
 
-/// When it was called: the end of its key, where it was not called before there was any reading.
+/// When it was called, where it was not called before there was any reading.
 fn since(key: &str) -> Option<Timestamp> {
-    let time = key.rsplit_once('/')?.1.parse().ok();
-    time.filter(|time| *time > BEFORE_ALL)
+    since_by_key(key).filter(|time| *time > BEFORE_ALL)
 }

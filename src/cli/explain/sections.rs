@@ -126,7 +126,7 @@ type PageCell = fn(&Effect) -> String;
 
 /// A column each; what none of them has is left out.
 fn effects(explanation: &Explanation) -> Option<TextTable> {
-    let all = [&explanation.verdict].into_iter().chain(&explanation.also);
+    let all = explanation.effects();
     let accepted: Vec<&Effect> = all.filter(|effect| is_an_effect(effect)).collect();
     if accepted.is_empty() {
         return None;

@@ -65,8 +65,8 @@ pub(super) fn held(
         });
     let found: Vec<PlannedBenchmark> = found.collect();
     if found.is_empty() {
-        let problem = without_readings(file, &looked, &args.covariates);
-        return Ok(match covariates_alone(&looked, &args.covariates) {
+        let problem = without_readings(file, &looked, &args.covariates.stated);
+        return Ok(match covariates_alone(&looked, &args.covariates.stated) {
             Some(names) => FoundInFile::Covariates(names, problem),
             None => FoundInFile::unusable(problem),
         });

@@ -12,7 +12,7 @@ mod text;
 mod times;
 mod unnamed;
 
-use super::args::{DialectArgs, FileArgs, OutputArgs, stated};
+use super::args::{CovariateArgs, DialectArgs, FileArgs, OutputArgs};
 use super::check;
 use super::exit::{self, NoSuchReadings, UsageError};
 use crate::config::{SourceKind, value};
@@ -56,9 +56,8 @@ pub(super) struct Args {
     /// How long it takes to bring everyone out, such as 12h
     #[arg(long, value_name = "DURATION", value_parser = value::duration)]
     evacuation_time: Option<SignedDuration>,
-    /// What a covariate measures whose name does not say it: rain, flow, level, temperature, humidity, pressure or other
-    #[arg(long = "covariate", value_name = "NAME=KIND", value_parser = stated)]
-    covariates: Vec<(String, CovariateKind)>,
+    #[command(flatten)]
+    covariates: CovariateArgs,
     /// Write over a config that is there
     #[arg(long)]
     force: bool,
@@ -244,7 +243,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
         missing: args.file.missing.clone(),
         sources,
         benchmarks: benchmarks.into_values().collect(),
-        covariates: args.covariates.clone(),
+        covariates: args.covariates.stated.clone(),
         averaging: args.file.averaging.map(in_words),
         evacuation_time: args.evacuation_time.map(in_words),
         hook: args.hook.clone(),

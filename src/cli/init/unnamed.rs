@@ -8,7 +8,7 @@ use std::path::Path;
 pub(super) fn without_readings(
     file: &Path,
     looked: &FileSurvey,
-    stated: &[(String, CovariateKind)],
+    covariates: &[(String, CovariateKind)],
 ) -> String {
     let is_named = |(_, meaning): &(String, Meaning)| {
         matches!(meaning, Meaning::Reading { .. } | Meaning::Component { .. })
@@ -42,7 +42,7 @@ pub(super) fn without_readings(
         };
     }
     let of_points = looked.columns.iter().filter(|(name, meaning)| {
-        numbers.contains(&name.as_str()) && !is_covariate(name, meaning, stated)
+        numbers.contains(&name.as_str()) && !is_covariate(name, meaning, covariates)
     });
     let first = of_points.map(|(name, _)| name.as_str()).next();
     let first = first.unwrap_or("NAME");
@@ -88,7 +88,7 @@ pub(super) fn mostly_refused(file: &Path, looked: &FileSurvey) -> Option<String>
 /// The covariates of a file, where it has numbers and each column of them is named as no reading is.
 pub(super) fn covariates_alone(
     looked: &FileSurvey,
-    stated: &[(String, CovariateKind)],
+    covariates: &[(String, CovariateKind)],
 ) -> Option<Vec<String>> {
     let numbers = looked
         .columns
@@ -97,7 +97,7 @@ pub(super) fn covariates_alone(
     let numbers: Vec<&(String, Meaning)> = numbers.collect();
     let are_all = numbers
         .iter()
-        .all(|(name, meaning)| is_covariate(name, meaning, stated));
+        .all(|(name, meaning)| is_covariate(name, meaning, covariates));
     let names = numbers.iter().map(|(name, _)| name.clone());
     (are_all && !numbers.is_empty()).then(|| names.collect())
 }
@@ -143,9 +143,9 @@ const OF_COVARIATES: [&str; 37] = [
     "melt",
 ];
 
-/// Whether a column's name, or the unit in it, says that it holds no readings, or it is `stated`.
-fn is_covariate(name: &str, meaning: &Meaning, stated: &[(String, CovariateKind)]) -> bool {
-    if stated.iter().any(|(column, _)| column == name) {
+/// Whether a column's name, or the unit in it, says that it holds no readings, or it is one of these `covariates`.
+fn is_covariate(name: &str, meaning: &Meaning, covariates: &[(String, CovariateKind)]) -> bool {
+    if covariates.iter().any(|(column, _)| column == name) {
         return true;
     }
     let plain = name.to_lowercase();

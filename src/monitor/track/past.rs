@@ -59,7 +59,7 @@ impl PastReplay {
 
     /// Whether a refit of `time` is reported.
     fn reports(&mut self, time: Timestamp) -> bool {
-        if time >= self.until || self.reported.is_some_and(|reported| time <= reported) {
+        if time >= self.until || Some(time) <= self.reported {
             return false;
         }
         if self.until.duration_since(time) <= ALL_FOR {
@@ -204,7 +204,7 @@ impl Track {
                     refits += 1;
                     events.extend(walk.reports(event.time).then_some(event));
                 } else if event.kind.is_of_the_record() {
-                    let is_new = walk.reported.is_none_or(|reported| event.time > reported);
+                    let is_new = Some(event.time) > walk.reported;
                     events.extend(is_new.then_some(event));
                 } else if is_of_a_level(&event) && event.time < walk.until {
                     walk.episode.push(event);
@@ -213,7 +213,7 @@ impl Track {
             if walk.track.level() == Level::Green {
                 let reported = walk.alerts_reported;
                 walk.alerts_reported = reported.max(walk.episode.last().map(|event| event.time));
-                let is_new = |event: &Event| reported.is_none_or(|reported| event.time > reported);
+                let is_new = |event: &Event| Some(event.time) > reported;
                 events.extend(walk.episode.drain(..).filter(is_new));
             }
         }

@@ -4,24 +4,6 @@ use super::{Dispatcher, HookQueue};
 use crate::config::HookConfig;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::oneshot;
-use tokio::task::AbortHandle;
-
-/// A worker of a hook that is not in the config any more, until it has ended.
-#[derive(Debug)]
-pub(super) struct LeavingWorker {
-    name: String,
-    /// Closed when it has ended.
-    ended: oneshot::Receiver<()>,
-}
-
-/// What is known of a worker that runs.
-#[derive(Debug)]
-pub(super) struct WorkerHandle {
-    pub(super) abort: AbortHandle,
-    /// Closed when it has ended.
-    pub(super) ended: oneshot::Receiver<()>,
-}
 
 impl Dispatcher {
     /// Goes by `hooks` from here on. A hook that is in the config already goes on, with what it runs and what waits for it, by what it says now:
@@ -51,49 +33,30 @@ impl Dispatcher {
         }
         for (hook, known) in hooks.iter().zip(known) {
             let way = known.unwrap_or_else(|| {
-                let former = self.leaving(&hook.name());
+                // People would be notified twice by both.
+                let former = self.leaving.remove(&hook.name());
                 self.begin(hook, former)
             });
             self.hooks.push(way);
         }
     }
 
-    /// The worker of a hook of this name that is at work still: a new one waits for its end, or people would be notified twice.
-    fn leaving(&mut self, name: &str) -> Option<oneshot::Receiver<()>> {
-        let place = self.leaving.iter().position(|one| one.name == name);
-        place.map(|place| self.leaving.swap_remove(place).ended)
-    }
-
     /// Nothing more comes for this hook.
     fn part_with(&mut self, way: HookQueue, limit: Duration) {
-        let HookQueue {
-            hook,
-            changes,
-            worker,
-            ..
-        } = way;
-        changes.send_replace(None);
-        let WorkerHandle { abort, ended } = worker;
-        let name = hook.name();
-        let text = name.clone();
+        let name = way.hook.name();
+        way.changes.send_replace(None);
+        self.leaving.insert(name.clone(), way.ended);
+        let worker = way.worker;
         tokio::spawn(async move {
             tokio::time::sleep(limit).await;
-            if !abort.is_finished() {
+            if !worker.is_finished() {
                 tracing::error!(
-                    hook = text,
+                    hook = name,
                     "not in the config any more, and stopped half-way"
                 );
-                abort.abort();
+                worker.abort();
             }
         });
-        self.leaving.retain_mut(LeavingWorker::is_at_work);
-        self.leaving.push(LeavingWorker { name, ended });
-    }
-}
-
-impl LeavingWorker {
-    fn is_at_work(&mut self) -> bool {
-        self.ended.try_recv() == Err(oneshot::error::TryRecvError::Empty)
     }
 }
 

@@ -25,13 +25,12 @@ use crate::config::HookConfig;
 use crate::monitor::EventKind;
 use crate::reading::BenchmarkId;
 use crate::store::DeliveryOutcome;
-use changed::{LeavingWorker, WorkerHandle};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::sync::{mpsc, oneshot, watch};
-use tokio::task::JoinSet;
+use tokio::task::{AbortHandle, JoinSet};
 use worker::Worker;
 
 /// Alerts that may wait for one hook.
@@ -83,7 +82,9 @@ struct HookQueue {
     queued: Arc<Mutex<QueuedAlerts>>,
     /// What the worker is to go by when the config says something else of the hook; `None` when it has no such hook any more.
     changes: watch::Sender<Option<Arc<HookConfig>>>,
-    worker: WorkerHandle,
+    worker: AbortHandle,
+    /// Closed when the worker has ended.
+    ended: oneshot::Receiver<()>,
 }
 
 impl HookQueue {
@@ -127,8 +128,8 @@ fn without_reported(alerts: Vec<Alert>) -> (Vec<Alert>, Vec<Alert>) {
 pub struct Dispatcher {
     hooks: Vec<HookQueue>,
     workers: JoinSet<usize>,
-    /// Those of hooks that the config has no more.
-    leaving: Vec<LeavingWorker>,
+    /// By name the hooks that the config has no more: closed when their workers have ended.
+    leaving: BTreeMap<String, oneshot::Receiver<()>>,
     delivered: Arc<Mutex<Delivered>>,
     runner: Arc<dyn Runner>,
     retry: Retry,
@@ -151,7 +152,7 @@ impl Dispatcher {
         let mut started = Self {
             hooks: Vec::new(),
             workers: JoinSet::new(),
-            leaving: Vec::new(),
+            leaving: BTreeMap::new(),
             delivered: Arc::new(Mutex::new(delivered)),
             runner: Arc::clone(runner),
             retry: retry.clone(),
@@ -170,7 +171,7 @@ impl Dispatcher {
         let runner = Arc::clone(&self.runner);
         let worker = Worker::new(Arc::clone(&hook), runner, &self.retry, delivered, shared);
         let (at_work, ended) = oneshot::channel::<()>();
-        let abort = self.workers.spawn(async move {
+        let worker = self.workers.spawn(async move {
             if let Some(former) = former {
                 // It sends nothing: closed when the worker has ended.
                 let _ = former.await;
@@ -184,7 +185,8 @@ impl Dispatcher {
             queue,
             queued,
             changes,
-            worker: WorkerHandle { abort, ended },
+            worker,
+            ended,
         }
     }
 

@@ -374,7 +374,9 @@ impl Worker {
     /// has it no more.
     fn change(&mut self, hook: Option<Arc<HookConfig>>) {
         self.is_left_out = hook.is_none();
-        self.hook = hook.unwrap_or(Arc::clone(&self.hook));
+        if let Some(hook) = hook {
+            self.hook = hook;
+        }
         for (turn, mut waiting) in std::mem::take(&mut self.waiting) {
             self.untried -= usize::from(waiting.is_new);
             if !self.is_wanted(&waiting.alert) {
@@ -395,13 +397,14 @@ impl Worker {
     }
 
     fn begin(&mut self, alert: Alert) {
+        let name = self.hook.name();
+        let before = locked(&self.delivered).attempts(&alert, &name);
         // A worker before this one may have had it taken, where the hook was left out of the config and put back.
-        let is_taken = locked(&self.delivered).has(&alert, &self.hook.name());
+        let is_taken = before > 0 && locked(&self.delivered).has(&alert, &name);
         if is_taken || !self.is_wanted(&alert) {
             locked(&self.queued).release(&alert);
             return;
         }
-        let before = locked(&self.delivered).attempts(&alert, &self.hook.name());
         let escalation = (before == 0).then(|| self.escalation(&alert)).flatten();
         let waiting = Waiting {
             alert,

@@ -326,11 +326,11 @@ impl FileTail {
 
     /// Takes the last line although nothing ends it, once whoever writes has had the time to go on.
     fn take_unended(&mut self) -> bool {
-        let since = self.idle_since.map_or(Duration::ZERO, Stopwatch::elapsed);
+        let has_rested = |since: Stopwatch| since.elapsed() >= WRITTEN;
         let Content::Text(text) = &mut self.content else {
             return false;
         };
-        let line = (since >= WRITTEN).then(|| text.unended());
+        let line = (self.idle_since.is_some_and(has_rested)).then(|| text.unended());
         line.flatten().map(|line| self.take(line)).is_some()
     }
 

@@ -193,19 +193,12 @@ impl Follower {
         let mut newest: Option<(FileKey, Timestamp)> = None;
         while let Some((time, .., key)) = self.heads.first() {
             // A table with its newest row on top is read on, or that row would be judged by a record of which nothing else is corrected.
-            let earlier = newest
-                .as_ref()
-                .is_some_and(|(file, newest)| file == key && time < newest);
-            if read
-                >= if earlier {
-                    MOST_BACKWARDS.max(most)
-                } else {
-                    most
-                }
-            {
+            let goes_back =
+                (newest.as_ref()).is_some_and(|(file, newest)| file == key && time < newest);
+            if read >= if goes_back { MOST_BACKWARDS } else { most } {
                 break;
             }
-            if !earlier {
+            if !goes_back {
                 newest = Some((key.clone(), *time));
             }
             let Some((.., key)) = self.heads.pop_first() else {

@@ -92,9 +92,38 @@ impl TextReader {
 
     /// Takes the next bytes.
     pub(in crate::runtime) fn feed(&mut self, bytes: &[u8]) -> LinesRead {
+        let lines = self.lines.feed(bytes);
+        self.taken(lines)
+    }
+
+    /// The last line, where it is taken for whole although nothing ends it ([`Lines::unended`]).
+    pub(super) fn unended(&mut self) -> Option<LinesRead> {
+        let line = self.lines.unended()?;
+        Some(self.taken([line]))
+    }
+
+    /// What comes of whole lines.
+    fn taken(&mut self, lines: impl IntoIterator<Item = TailLine>) -> LinesRead {
         let mut fed = LinesRead::default();
-        for line in self.lines.feed(bytes) {
-            self.take_line(line, &mut fed);
+        for line in lines {
+            let number = line.number;
+            let (text, error) = match line.text {
+                Err(LineFault::NotUtf8 {
+                    latin1: Some(text), ..
+                }) if self.rows.takes_latin1() => {
+                    fed.remarks.push(Remark::latin1(number));
+                    self.line(number, text, &mut fed)
+                }
+                Err(fault) => (String::new(), Some(fault.into())),
+                Ok(text) => self.line(number, text, &mut fed),
+            };
+            let Some(error) = error else { continue };
+            fed.is_lost = !text.is_empty() && self.rows.is_lost();
+            fed.bad.push(BadLine {
+                number,
+                text,
+                error,
+            });
             if fed.is_lost {
                 break;
             }
@@ -109,37 +138,6 @@ impl TextReader {
             fed.remarks.push(Remark::utf16());
         }
         fed
-    }
-
-    /// The last line, where it is taken for whole although nothing ends it ([`Lines::unended`]).
-    pub(super) fn unended(&mut self) -> Option<LinesRead> {
-        let line = self.lines.unended()?;
-        let mut fed = LinesRead::default();
-        self.take_line(line, &mut fed);
-        fed.items
-            .sort_by(|(_, one), (_, next)| order(one).cmp(&order(next)));
-        Some(fed)
-    }
-
-    fn take_line(&mut self, line: TailLine, fed: &mut LinesRead) {
-        let number = line.number;
-        let (text, error) = match line.text {
-            Err(LineFault::NotUtf8 {
-                latin1: Some(text), ..
-            }) if self.rows.takes_latin1() => {
-                fed.remarks.push(Remark::latin1(number));
-                self.line(number, text, fed)
-            }
-            Err(fault) => (String::new(), Some(fault.into())),
-            Ok(text) => self.line(number, text, fed),
-        };
-        let Some(error) = error else { return };
-        fed.is_lost = !text.is_empty() && self.rows.is_lost();
-        fed.bad.push(BadLine {
-            number,
-            text,
-            error,
-        });
     }
 
     fn line(
