@@ -21,7 +21,7 @@ use super::rival::Rival;
 use super::search::SearchResult;
 use super::term::{Scratch, Term};
 use super::verdict::{LARGEST_REST, Verdict, contribution};
-use crate::reading::{Unit, after_days};
+use crate::reading::{Unit, after_days, rounding_error};
 use std::collections::BTreeMap;
 
 /// What is left is no noise where a test gives it less than this p-value, and nothing is explained in full under the second one.
@@ -392,7 +392,7 @@ fn residual_tests(
             let judged = Judged::of(problem, fitted, &ready.bank, scratch)?;
             let innovations = innovations(problem, fitted, judged.plain);
             // A step of the resolution is so many times the error that it makes.
-            let step = 12.0_f64.sqrt() * problem.rounding / fitted.sigma;
+            let step = problem.rounding / rounding_error(fitted.sigma);
             let load = judged
                 .load
                 .map(|(whitener, _)| undeclared_load(problem, fitted, whitener));

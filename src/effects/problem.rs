@@ -6,6 +6,7 @@ use super::weights::{local_misfits, unit_median, weights};
 use crate::fit::Observations;
 use crate::reading::{
     Channel, NORMAL_MEDIAN, Quantity, SECONDS_PER_DAY, Series, Timestamp, days_since,
+    rounding_error,
 };
 
 /// More readings than this are averaged in blocks.
@@ -199,7 +200,7 @@ fn rounding(series: &Series, y: &[f64]) -> f64 {
     let step = resolution(&values) * series.unit.factor();
     let most = y.iter().fold(1e-3_f64, |most, y| most.max(y.abs()));
     let together = values.len() as f64 / y.len() as f64;
-    (step / 12.0_f64.sqrt() / together.sqrt()).max(FINEST * most)
+    (rounding_error(step) / together.sqrt()).max(FINEST * most)
 }
 
 fn channel_spacing(channel: &Channel) -> Option<f64> {

@@ -3,7 +3,9 @@
 //! Displacement differences over short intervals are noise; intervals are merged, newest first,
 //! until the slip in them stands clear of it, so that slow creep and fast sliding are both resolved.
 
-use crate::reading::{NORMAL_MEDIAN, Quantity, SECONDS_PER_DAY, Series, days_since, upper_median};
+use crate::reading::{
+    NORMAL_MEDIAN, Quantity, SECONDS_PER_DAY, Series, days_since, rounding_error, upper_median,
+};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -217,11 +219,7 @@ fn resolution_sigma(values: &[Observation]) -> f64 {
     let shows = moved.len() >= FEWEST_STEPS
         && moved.len() as f64 <= (1.0 - WITHOUT_STEP) * count
         && multiples.count() as f64 >= MULTIPLES * moved.len() as f64;
-    if shows {
-        shortest / 12.0_f64.sqrt()
-    } else {
-        0.0
-    }
+    if shows { rounding_error(shortest) } else { 0.0 }
 }
 
 /// The standard error of one displacement reading, mm: from how far each stands from the line between
@@ -474,7 +472,7 @@ mod tests {
                     .collect::<Vec<_>>(),
             )
         };
-        let expected = 10.0 / 12.0_f64.sqrt();
+        let expected = rounding_error(10.0);
         let found = displacement_sigma(&values(10.0).values);
         assert!((found / expected - 1.0).abs() < 0.01, "{found}");
         let rates = values(10.0).rates(0..400, RateOptions::default());

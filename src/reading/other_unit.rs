@@ -1,6 +1,7 @@
 //! A unit that changes within a series, as from millimetres to metres under the same header: the readings lie far from those
 //! before, and go on from them when they are multiplied by the ratio of two units.
 
+use super::resolution::is_whole;
 use super::suspicion::{DatedSuspicion, Suspicion, scatter_of};
 use super::{Quantity, Timestamp, whole_figure};
 use serde::{Deserialize, Serialize};
@@ -295,7 +296,6 @@ pub fn standing(readings: &[(Timestamp, f64)], quantity: Quantity) -> Option<Oth
 
 /// A unit of the last digit that any of these values has.
 fn last_digit(values: &[(Timestamp, f64)]) -> f64 {
-    let is_whole = |value: f64| (value - value.round()).abs() < 1e-6;
     let decimals = |value: f64| {
         let mut all = 0..MOST_DECIMALS;
         all.find(|decimals| is_whole(value * 10_f64.powi(*decimals)))

@@ -1,6 +1,7 @@
 //! What in a benchmark's readings hardly means what was intended: a wrong unit, a wrong zone, a mark for no value, a
 //! reset that nobody declared.
 
+use super::resolution::is_whole;
 use super::{Quantity, Timestamp, figure, upper_median, whole_figure};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -216,10 +217,6 @@ pub fn have_moved(values: impl IntoIterator<Item = f64>, unit: &str) -> bool {
 
 fn are_in_thousandths<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
     values.into_iter().all(|value| is_whole(value * 1e3))
-}
-
-fn is_whole(value: f64) -> bool {
-    (value - value.round()).abs() < 1e-6
 }
 
 /// What the values of readings in `unit`, in order of time, give rise to.

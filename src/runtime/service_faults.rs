@@ -40,17 +40,20 @@ pub enum ServiceFaultKind {
     FileUnreadable,
     /// Make anything of a file, until it is replaced.
     FileRefused,
+    /// Take the last row of a file, which has no line break.
+    RowUnended,
 }
 
 impl ServiceFaultKind {
     /// Each of them.
-    pub(super) const ALL: [Self; 7] = [
+    pub(super) const ALL: [Self; 8] = [
         Self::StateUnwritable,
         Self::BrokerUnreachable,
         Self::SubscriptionRefused,
         Self::FolderUnreadable,
         Self::FileUnreadable,
         Self::FileRefused,
+        Self::RowUnended,
         Self::HookFailing,
     ];
 
@@ -63,6 +66,7 @@ impl ServiceFaultKind {
             Self::FolderUnreadable => "folder-unreadable",
             Self::FileUnreadable => "file-unreadable",
             Self::FileRefused => "file-refused",
+            Self::RowUnended => "row-unended",
             Self::HookFailing => "hook-failing",
         }
     }
@@ -74,7 +78,10 @@ impl ServiceFaultKind {
             | Self::BrokerUnreachable
             | Self::SubscriptionRefused
             | Self::HookFailing => false,
-            Self::FolderUnreadable | Self::FileUnreadable | Self::FileRefused => true,
+            Self::FolderUnreadable
+            | Self::FileUnreadable
+            | Self::FileRefused
+            | Self::RowUnended => true,
         }
     }
 }

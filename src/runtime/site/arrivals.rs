@@ -364,7 +364,7 @@ impl Site {
         self.prove(host_time);
         let mut events = Vec::new();
         // Before the first reading there is no past that could be over.
-        let is_read = self.read.count() > 0 && !self.is_crowded();
+        let is_read = self.read.count() > 0 && !self.is_short_rush();
         for _ in 0..MOST_JUDGED {
             if is_read && self.monitor.owes_current() {
                 events.extend(self.judge_current());

@@ -6,9 +6,9 @@
 
 mod alerts;
 mod arrivals;
-mod crowd;
 mod flood;
 mod memory;
+mod message_rush;
 mod mute;
 mod read_times;
 mod returned;
@@ -23,7 +23,7 @@ pub use mute::Mute;
 pub(super) use mute::announce_ends;
 pub(super) use unproven::Unproven;
 
-use crowd::MessageRush;
+use message_rush::MessageRush;
 use mute::Mutes;
 use read_times::ReadTimes;
 use returned::Returned;
@@ -121,7 +121,7 @@ pub struct Site {
     /// Values that were taken before, and corrected: until all that came with them has been seen.
     returned: Returned,
     /// Messages that come so fast that the past is not over yet.
-    crowd: MessageRush,
+    rush: MessageRush,
     /// Runs since something came late of which more may come in the next batch.
     batch_goes_on: Option<Stopwatch>,
 }
@@ -150,7 +150,7 @@ impl Site {
             held: VecDeque::new(),
             waiting: WaitingReadings::default(),
             returned: Returned::default(),
-            crowd: MessageRush::default(),
+            rush: MessageRush::default(),
             batch_goes_on: None,
         }
     }

@@ -57,7 +57,7 @@ pub(super) struct FileTail {
     /// As of the last look that found nothing more; the file is opened only when it differs.
     pub(super) idle: Option<Glance>,
     /// Runs since then.
-    idle_since: Option<Stopwatch>,
+    pub(super) idle_since: Option<Stopwatch>,
     /// When it was last written to, as of the last read.
     pub(super) modified: (i64, i64),
     /// When it was last written to, or came under its name, by the host's clock, as of the last look.

@@ -1,4 +1,4 @@
-//! What comes faster than it can be judged: a crowd of messages, which are a broker's backlog (on a first start they belong to the
+//! What comes faster than it can be judged: many messages at once, which are a broker's backlog (on a first start they belong to the
 //! past, later they are judged together), and the history of a benchmark that begins while others are watched.
 
 use super::Site;
@@ -9,10 +9,10 @@ use crate::runtime::tail::Arrival;
 use jiff::SignedDuration;
 use std::time::Duration;
 
-/// So many messages within [`WINDOW`] are a crowd.
-const CROWD: usize = 100;
+/// So many messages within [`WINDOW`] come faster than each can be judged.
+const MANY: usize = 100;
 const WINDOW: Duration = Duration::from_secs(1);
-/// However long a crowd lasts, the past that came is judged after so long.
+/// However long messages come so fast, the past that came is judged after so long.
 const LONGEST: Duration = Duration::from_secs(60);
 /// So long a queue is judged while more come: as long as an alert that people are to be notified of at once may wait for
 /// others.
@@ -29,7 +29,7 @@ const HISTORY: SignedDuration = SignedDuration::from_hours(24);
 pub(super) struct MessageRush {
     /// Since when they are counted, and how many came since then.
     counted: Option<(Stopwatch, usize)>,
-    /// When the first and the last crowd came.
+    /// When so many came for the first time and for the last.
     came: Option<(Stopwatch, Stopwatch)>,
     /// Since when the past is being read without what is current being judged.
     reads_past: Option<Stopwatch>,
@@ -41,37 +41,37 @@ impl Site {
     /// A message is about to be taken, and so many wait behind it.
     pub fn messages_come(&mut self, waiting: usize) {
         let now = Stopwatch::start();
-        let counted = self.crowd.counted;
+        let counted = self.rush.counted;
         let (since, before) = counted
             .filter(|(since, _)| since.elapsed() <= WINDOW)
             .unwrap_or((now, 0));
         let count = before + 1;
-        self.crowd.counted = Some((since, count));
-        if count + waiting >= CROWD {
-            let first = self.crowd.came.map_or(now, |(first, _)| first);
-            self.crowd.came = Some((first, now));
+        self.rush.counted = Some((since, count));
+        if count + waiting >= MANY {
+            let first = self.rush.came.map_or(now, |(first, _)| first);
+            self.rush.came = Some((first, now));
         }
     }
 
-    /// Where messages come in a crowd, what they hold from here on is judged at [`Site::end_batch`].
+    /// Where messages come faster than they can be judged, what they hold from here on is judged at [`Site::end_batch`].
     pub fn queue(&mut self) {
-        if self.monitor.queues() || self.monitor.reads_all_past() || !self.comes_crowded() {
+        if self.monitor.queues() || self.monitor.reads_all_past() || !self.is_rush() {
             return;
         }
-        self.crowd.queues = Some((Stopwatch::start(), self.counts.taken));
+        self.rush.queues = Some((Stopwatch::start(), self.counts.taken));
         self.step(self.data_now(), &Input::Notice(Notice::Queue));
     }
 
     /// Whether values have queued and may queue further.
     pub fn may_queue_on(&self) -> bool {
-        let queues = self.crowd.queues.filter(|_| self.monitor.queues());
+        let queues = self.rush.queues.filter(|_| self.monitor.queues());
         queues.is_some_and(|(since, taken)| {
             since.elapsed() < LONGEST_QUEUE && self.counts.taken - taken < MOST_QUEUED
         })
     }
 
-    fn comes_crowded(&self) -> bool {
-        let came = self.crowd.came;
+    fn is_rush(&self) -> bool {
+        let came = self.rush.came;
         came.is_some_and(|(_, last)| last.elapsed() <= WINDOW)
     }
 
@@ -79,10 +79,10 @@ impl Site {
     pub fn judge_meanwhile(&mut self) -> Vec<Event> {
         let mut events = Vec::new();
         if !self.monitor.reads_past() {
-            self.crowd.reads_past = None;
+            self.rush.reads_past = None;
             return events;
         }
-        let since = *self.crowd.reads_past.get_or_insert_with(Stopwatch::start);
+        let since = *self.rush.reads_past.get_or_insert_with(Stopwatch::start);
         if since.elapsed() < LONGEST {
             return events;
         }
@@ -91,7 +91,7 @@ impl Site {
         while self.monitor.owes_current() {
             events.extend(self.judge_current());
         }
-        self.crowd.reads_past = None;
+        self.rush.reads_past = None;
         let now = self.data_now();
         let again = if is_of_all {
             vec![Notice::Past]
@@ -122,8 +122,8 @@ impl Site {
     }
 
     /// Whether more are to be expected at once.
-    pub(super) fn is_crowded(&self) -> bool {
-        let came = self.crowd.came;
-        self.comes_crowded() && came.is_some_and(|(first, _)| first.elapsed() <= LONGEST)
+    pub(super) fn is_short_rush(&self) -> bool {
+        let came = self.rush.came;
+        self.is_rush() && came.is_some_and(|(first, _)| first.elapsed() <= LONGEST)
     }
 }
