@@ -14,9 +14,13 @@ const SETTLED: usize = 5;
 const LOOKED_AT: usize = 512;
 /// A mean that stands clear of zero does so by so many standard errors.
 const CLEAR_ERRORS: f64 = 4.0;
-/// The error that the first readings may have, mm, and how many times that is taken off their motion.
+/// The error that the first three readings may have, mm, and how many times that is taken off their motion.
 const FIRST_ERROR_MM: f64 = 20.0;
 const FIRST_ERRORS: f64 = 6.0;
+/// More of them show by themselves how they scatter, the less surely the fewer there are; but an instrument that has just been set up may drift by so
+/// much, mm, before it is steady (satellite positions by carrier phase converge over an hour or so).
+const FIRST_DRIFT_MM: f64 = 50.0;
+const KNOWN_FROM: usize = 4;
 /// Before rates are known the velocity is looked for over so many steps.
 const LAST_STEPS: usize = 12;
 /// Last decimal places of displacements, mm, the coarsest first: of metres, centimetres and millimetres, of feet and of inches; and how far, in
@@ -27,6 +31,10 @@ const DIGITS_MM: [f64; 11] = [
 const NO_DIGIT: f64 = 1e-3;
 /// A settled velocity is a new highest from this factor on.
 const HIGHER: f64 = 1.25;
+/// A reading has fallen that lies so many standard errors under the one before it, and the next one is back where it lies off that one by this
+/// share of the fall at most.
+const FALLEN_ERRORS: f64 = 10.0;
+const BACK: f64 = 0.25;
 
 /// The newest rates, through which the line goes.
 pub(crate) fn recent(rates: &[Rate]) -> &[Rate] {
@@ -121,9 +129,12 @@ pub(super) fn observed(
     evacuation_days: f64,
 ) -> AlertEvidence {
     let newest = rates.last().map(|rate| rate.velocity);
+    let velocity = newest.or_else(|| newest_velocity(observations));
+    let since_a_fall = back_from_a_fall(observations);
     AlertEvidence {
         now,
-        velocity_mm_per_day: newest.or_else(|| newest_velocity(observations)),
+        velocity_mm_per_day: velocity
+            .map(|velocity| since_a_fall.map_or(velocity, |since| velocity.min(since))),
         settled_velocity_mm_per_day: if are_first(observations) {
             from_the_first(observations)
         } else {
@@ -159,9 +170,7 @@ fn from_the_first(observations: &Observations) -> Option<f64> {
             let steps = values.windows(2);
             let each = steps.map(|w| (w[1].value - w[0].value) / (w[1].t_days - w[0].t_days));
             let least = each.fold(f64::INFINITY, f64::min);
-            let error = displacement_sigma(&values).max(FIRST_ERROR_MM);
-            let moved =
-                newest.value - first.value - FIRST_ERRORS * std::f64::consts::SQRT_2 * error;
+            let moved = newest.value - first.value - first_error(&values);
             least.min(moved / (newest.t_days - first.t_days))
         }
         Quantity::Velocity => {
@@ -177,6 +186,34 @@ fn from_the_first(observations: &Observations) -> Option<f64> {
         }
     };
     (by_each > 0.0).then_some(by_each)
+}
+
+/// How far the first displacements may lie off each other though nothing has moved, mm.
+fn first_error(values: &[Observation]) -> f64 {
+    let own = displacement_sigma(values);
+    let times = FIRST_ERRORS * std::f64::consts::SQRT_2;
+    let unknown = times * own.max(FIRST_ERROR_MM);
+    if values.len() < KNOWN_FROM {
+        return unknown;
+    }
+    let unsure = 1.0 + 4.0 / (values.len() - 2) as f64;
+    (times * unsure * own).max(FIRST_DRIFT_MM).min(unknown)
+}
+
+/// The velocity, mm/day, where the newest displacement is back from one wrong reading that lay far under the others: since the one before that. The
+/// rise from the wrong one is no motion.
+fn back_from_a_fall(observations: &Observations) -> Option<f64> {
+    let values = &observations.values;
+    let [.., before, fallen, newest] = values.as_slice() else {
+        return None;
+    };
+    let fall = before.value - fallen.value;
+    let moved = newest.value - before.value;
+    let is_back =
+        observations.quantity == Quantity::Displacement && fall > 0.0 && moved.abs() < BACK * fall;
+    let looked_at = || &values[values.len().saturating_sub(LOOKED_AT)..];
+    let is_far = is_back && fall > FALLEN_ERRORS * displacement_sigma(looked_at());
+    is_far.then(|| moved / (newest.t_days - before.t_days))
 }
 
 fn acceleration(rates: &[Rate]) -> Option<f64> {
@@ -233,6 +270,28 @@ fn last_digit_mm(values: &[Observation]) -> f64 {
 mod tests {
     use super::*;
     use crate::fit::RateOptions;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64;
+
+    #[test]
+    fn the_return_from_one_reading_far_below_the_others_is_no_velocity() {
+        let noise = |hour: u32| 0.1 * f64::from(hour * 37 % 23) / 23.0;
+        let velocity = |last: [f64; 2]| {
+            let steady = (0..40).map(|hour| f64::from(hour) / 24.0 + noise(hour));
+            let values = steady.chain(last.map(|off| 40.0 / 24.0 + off));
+            let at = |(hour, value): (usize, f64)| (hour as f64 / 24.0, value);
+            let read = Observations::of_displacements(values.enumerate().map(at));
+            let rates = read.rates(0..read.values.len(), RateOptions::default());
+            let now = Timestamp::UNIX_EPOCH;
+            let seen = observed(&read, &rates, now, 1.0);
+            seen.velocity_mm_per_day.unwrap()
+        };
+        assert!(velocity([-20.0, 0.0]).abs() < 5.0);
+        // Where more than that has moved since, all of it counts, and so does a rise that no fall came before.
+        assert!(velocity([-20.0, 15.0]) > 100.0);
+        assert!(velocity([0.0, 20.0]) > 100.0);
+    }
 
     #[test]
     fn one_step_of_a_radar_that_gives_whole_millimetres_is_no_velocity_and_two_are_half() {
@@ -286,6 +345,36 @@ mod tests {
         let one_wrong = shown(&[0.0, 12_000.0, 12_001.0, 12_002.0], 1.0);
         assert!(one_wrong.is_none_or(|velocity| velocity < 1.5));
         assert_eq!(shown(&[0.0, 30.0, 60.0, 75.0], 1.0 / 24.0), None);
+        // Two metres a day read each half hour, and a receiver that drifts by 50 mm until it is steady.
+        let two_metres = [0.0, 41.9, 83.2, 125.1];
+        assert!(shown(&two_metres, 1.0 / 48.0).unwrap() > 1000.0);
+        assert!(shown(&two_metres[..3], 1.0 / 48.0).is_none_or(|velocity| velocity < 1000.0));
+        let steady = (0..9).map(|reading| 50.0 * (1.0 - f64::powi(0.4, reading)));
+        let steady: Vec<f64> = steady.collect();
+        for count in 3..=9 {
+            assert_eq!(shown(&steady[..count], 1.0 / 48.0), None, "{count}");
+        }
+    }
+
+    #[test]
+    fn the_first_readings_of_a_slope_at_rest_never_pass_the_critical_velocity_by_their_noise() {
+        let mut random = Pcg64::seed_from_u64(5);
+        for series in 0..20_000 {
+            let size = [1.0, 5.0, 20.0][series % 3];
+            let mut noise = |index: usize| {
+                let z: f64 = random.sample(StandardNormal);
+                (index as f64 / 48.0, size * z)
+            };
+            let values: Vec<(f64, f64)> = (0..9).map(&mut noise).collect();
+            for count in 3..=9 {
+                let read = Observations::of_displacements(values[..count].to_vec());
+                let shown = from_the_first(&read);
+                assert!(
+                    shown.is_none_or(|velocity| velocity < 1000.0),
+                    "{series} {count}"
+                );
+            }
+        }
     }
 
     /// Velocities of an instrument that states no error.

@@ -119,7 +119,7 @@ fn end_members(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()>
             .chain([end.clone()])
             .map(|end| identifier(&end.beginning()))
             .collect();
-        let chain = read(&chain_file(cap, &end))?;
+        let chain = chain_of(cap, &end)?;
         let is_its_own = chain.iter().any(|one| begun.contains(&one.identifier));
         if is_its_own {
             written(cap, &end, now)?;
@@ -142,16 +142,33 @@ fn identifier(alert: &Alert) -> String {
     )
 }
 
-/// Where the chain of messages stands that `alert` belongs to.
+/// Where the chain of messages stands that `alert` belongs to. Several sites may write into one folder, where a program forwards what
+/// comes there.
 fn chain_file(cap: &CapFolder, alert: &Alert) -> PathBuf {
-    let name = format!("{}.json", short(&place(alert)));
-    cap.folder.join("chains").join(name)
+    named_chain(cap, &format!("{}\n{}", alert.site, place(alert)))
+}
+
+fn named_chain(cap: &CapFolder, name: &str) -> PathBuf {
+    cap.folder
+        .join("chains")
+        .join(format!("{}.json", short(name)))
+}
+
+/// The chain that `alert` belongs to. Up to version 0.1.0 its name did not say of which site it was: the first site that asks for it takes it
+/// over.
+fn chain_of(cap: &CapFolder, alert: &Alert) -> io::Result<Vec<CapMessage>> {
+    let file = chain_file(cap, alert);
+    let former = named_chain(cap, &place(alert));
+    if former.exists() && !file.exists() {
+        fs::rename(&former, &file)?;
+    }
+    read(&file)
 }
 
 fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
     fs::create_dir_all(cap.folder.join("chains"))?;
     let place = chain_file(cap, alert);
-    let mut chain = read(&place)?;
+    let mut chain = chain_of(cap, alert)?;
     let identifier = identifier(alert);
     let is_cancel = alert.state == MessageState::Resolved;
     let known = chain.iter().position(|one| one.identifier == identifier);

@@ -42,11 +42,13 @@ pub enum ServiceFaultKind {
     FileRefused,
     /// Take the last row of a file, which has no line break.
     RowUnended,
+    /// Use any of the newest rows of a file.
+    RowsRefused,
 }
 
 impl ServiceFaultKind {
     /// Each of them.
-    pub(super) const ALL: [Self; 8] = [
+    pub(super) const ALL: [Self; 9] = [
         Self::StateUnwritable,
         Self::BrokerUnreachable,
         Self::SubscriptionRefused,
@@ -54,6 +56,7 @@ impl ServiceFaultKind {
         Self::FileUnreadable,
         Self::FileRefused,
         Self::RowUnended,
+        Self::RowsRefused,
         Self::HookFailing,
     ];
 
@@ -67,6 +70,7 @@ impl ServiceFaultKind {
             Self::FileUnreadable => "file-unreadable",
             Self::FileRefused => "file-refused",
             Self::RowUnended => "row-unended",
+            Self::RowsRefused => "rows-refused",
             Self::HookFailing => "hook-failing",
         }
     }
@@ -81,7 +85,8 @@ impl ServiceFaultKind {
             Self::FolderUnreadable
             | Self::FileUnreadable
             | Self::FileRefused
-            | Self::RowUnended => true,
+            | Self::RowUnended
+            | Self::RowsRefused => true,
         }
     }
 }

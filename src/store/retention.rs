@@ -1,8 +1,8 @@
-//! What goes with time: older refits but for the first of each day, and the deliveries of alerts that are over.
+//! What goes with time: older refits but for the first of each day and those on which alerts rest, and the deliveries of alerts that are over.
 
 use super::{Store, StoreError, nanoseconds, read};
 use crate::reading::Timestamp;
-use rusqlite::{Connection, TransactionBehavior, params};
+use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
 use std::collections::BTreeMap;
 
 /// Rows that go in one commit at most.
@@ -22,7 +22,7 @@ struct Refit {
 }
 
 impl Store {
-    /// Of the refits before `before` (data time) keeps the first of each UTC day and benchmark, and drops deliveries
+    /// Of the refits before `before` (data time) keeps the first of each UTC day and benchmark and those on which an alert rests, and drops deliveries
     /// that are done of alerts that ended before it: a piece in one commit. Returns whether there may be more. It goes
     /// on where it was, after a restart too. Steps and all other events stay.
     ///
@@ -50,11 +50,12 @@ impl Store {
             benchmark,
         } in refits
         {
-            if kept.get(&benchmark) == Some(&day) {
+            let is_kept = kept.get(&benchmark) == Some(&day);
+            if is_kept && !carries_an_alert(&transaction, seq, &benchmark)? {
                 transaction
                     .prepare_cached("DELETE FROM event WHERE seq = ?1")?
                     .execute([seq])?;
-            } else {
+            } else if !is_kept {
                 kept.insert(benchmark.clone(), day);
                 fresh.insert(benchmark, day);
             }
@@ -90,6 +91,21 @@ fn old_refits(connection: &Connection, before: i64, newest: i64) -> Result<Vec<R
         });
     }
     Ok(refits)
+}
+
+/// Whether an alert of the benchmark rests on this refit: it comes before the next one.
+fn carries_an_alert(
+    connection: &Connection,
+    seq: i64,
+    benchmark: &str,
+) -> Result<bool, StoreError> {
+    // In the order of their numbers: an index of the benchmark would have all of its refits sorted.
+    let mut query = connection.prepare_cached(
+        "SELECT kind FROM event NOT INDEXED WHERE seq > ?1 AND benchmark = ?2 AND kind IN ('refit', 'alert') ORDER BY seq LIMIT 1",
+    )?;
+    let next: Option<String> =
+        (query.query_row(params![seq, benchmark], |row| row.get(0))).optional()?;
+    Ok(next.is_some_and(|kind| kind == "alert"))
 }
 
 /// A benchmark's refits come in the order of their times: its last day is all there is to know.

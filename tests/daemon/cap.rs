@@ -299,6 +299,25 @@ fn a_drill_writes_a_message_that_says_test_and_check_refuses_an_outline_that_is_
 }
 
 #[tokio::test]
+async fn the_end_at_one_site_cancels_nothing_of_another_that_writes_into_the_same_folder() {
+    let (folder, hook) = folder();
+    let at = folder.path();
+    let red = |state| alert("5", Level::Red, (state, Status::Actual));
+    let (firing, resolved) = (red(AlertState::Firing), red(AlertState::Resolved));
+    let south = |alert: &Alert| Alert {
+        site: "south".to_owned(),
+        ..alert.clone()
+    };
+    let first = written(at, &hook, &firing).await.unwrap();
+    let other = written(at, &hook, &south(&firing)).await.unwrap();
+    assert_eq!(kind(&other), ("Alert".to_owned(), String::new()));
+    let end = written(at, &hook, &south(&resolved)).await.unwrap();
+    assert_eq!(kind(&end), ("Cancel".to_owned(), reference(&other)));
+    let end = written(at, &hook, &resolved).await.unwrap();
+    assert_eq!(kind(&end), ("Cancel".to_owned(), reference(&first)));
+}
+
+#[tokio::test]
 async fn the_end_of_what_another_level_has_replaced_cancels_nothing() {
     let (folder, hook) = folder();
     let actual = |state| (state, Status::Actual);

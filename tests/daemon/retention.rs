@@ -4,8 +4,8 @@ use crate::identity::red_fires;
 use jiff::{SignedDuration, Timestamp};
 use slipwatch::alert::Level;
 use slipwatch::monitor::{
-    CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime, Input, InverseVelocity,
-    LevelChance, RegimeReport,
+    AlertState, CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime, Input,
+    InverseVelocity, LevelChance, RegimeReport,
 };
 use slipwatch::reading::{BenchmarkId, Reading, Unit};
 use slipwatch::regime::Regime;
@@ -179,6 +179,35 @@ fn of_old_refits_the_first_of_each_day_and_benchmark_stays_and_of_the_rest_every
         store.steps(0).unwrap().len(),
         usize::try_from(steps).unwrap()
     );
+}
+
+#[test]
+fn a_refit_on_which_an_alert_rests_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let benchmarks = ["5", "6"].map(BenchmarkId::new);
+    let store = Store::open(folder.path()).unwrap();
+    take(&store, &benchmarks, 0..17);
+    let time = at(16 * 3600);
+    let red = EventKind::Alert {
+        level: Level::Red,
+        state: AlertState::Firing,
+        key: format!("5/red/{time}"),
+        rule: "chance-for-red".to_owned(),
+        text: "red".to_owned(),
+    };
+    let mut batch = Batch::default();
+    let called = [event(red, &benchmarks[0], time)];
+    batch.step(time, &reading(&benchmarks[0], time), &called);
+    store.commit(&batch).unwrap();
+    take(&store, &benchmarks, 17..24);
+    thin(&store, at(100 * DAY));
+    let refits = kept(&store)
+        .into_iter()
+        .filter(|(_, kind, _)| kind == "refit");
+    let refits: Vec<(i64, String)> = refits.map(|(time, _, id)| (time / 3600, id)).collect();
+    // The newest event is never taken out.
+    let expected = [(0, "5"), (0, "6"), (16, "5"), (23, "6")];
+    assert_eq!(refits, expected.map(|(hour, id)| (hour, id.to_owned())));
 }
 
 #[test]

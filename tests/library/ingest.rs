@@ -314,6 +314,37 @@ fn a_file_followed_row_by_row_gives_what_the_whole_file_gives() {
 }
 
 #[test]
+fn rows_that_lack_their_last_cells_are_read_from_the_third_on_and_a_torn_one_is_not() {
+    let header = "time,a_displacement_mm,b_displacement_mm,c_displacement_mm";
+    let mut rows = CsvRows::new(Path::new("x.csv"), header, &ReadOptions::default()).unwrap();
+    let mut line = 1;
+    let mut taken = |cells: &str| {
+        line += 1;
+        let row = format!("2020-01-{line:02}T00:00:00Z{cells}");
+        rows.row(line, &row).map(|items| items.len()).ok()
+    };
+    assert_eq!(taken(",1,2,3"), Some(3));
+    assert_eq!(taken(",1"), None);
+    assert_eq!(taken(",1,2,3"), Some(3));
+    let short = [",1,2", ",1,2", ",1,2", ",1,2"].map(&mut taken);
+    assert_eq!(short, [None, None, Some(2), Some(2)]);
+    assert_eq!(taken(",1"), None, "another number of cells may be torn");
+    assert_eq!(taken(",1,2,3"), Some(3));
+    assert_eq!(taken(",1,2"), None);
+    assert_eq!(taken(",1,2,3,,"), Some(3), "what there is more is empty");
+    assert_eq!(taken(",1,2,3,4"), None);
+}
+
+#[test]
+fn a_header_that_comes_again_behind_a_byte_order_mark_is_understood() {
+    let header = "time,a_displacement_mm,b_displacement_mm";
+    let mut rows = CsvRows::new(Path::new("x.csv"), header, &ReadOptions::default()).unwrap();
+    let again = "\u{feff}time,a_displacement_mm,b_displacement_mm,c_displacement_mm";
+    assert_eq!(rows.row(2, again).unwrap(), []);
+    assert_eq!(rows.row(3, "2020-01-01T00:00:00Z,1,2,3").unwrap().len(), 3);
+}
+
+#[test]
 fn a_column_map_names_the_benchmark_and_must_meet_its_column() {
     let folder = TempDir::new().unwrap();
     let file = write(

@@ -24,9 +24,11 @@ impl Track {
             self.pending.is_judged();
             return Vec::new();
         }
-        let mut events = self.judge(policy, time, context);
+        let mut events: Vec<Event> = self.record.end_late_batch().into_iter().collect();
+        let mut judged = self.judge(policy, time, context);
         self.forecaster.forget_prepared();
-        self.pending.hold_back(&mut events);
+        self.pending.hold_back(&mut judged);
+        events.extend(judged);
         events
     }
 

@@ -195,6 +195,8 @@ impl CsvRows {
     /// before one that is. A cell that is no number costs its own value alone: see
     /// [`CsvRows::take_fault`].
     pub fn row(&mut self, line: u64, text: &str) -> Result<Vec<Item>, IngestError> {
+        // A logger that opens its file again may begin with it again.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let expected = self.columns().len();
         self.splitter
             .split(text, &mut self.cells)

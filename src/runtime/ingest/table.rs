@@ -11,6 +11,18 @@ use std::path::{Path, PathBuf};
 
 /// Characters of a text that are shown of it.
 const SHOWN: usize = 40;
+/// So many rows one after the other that lack as many cells at their end have been written so: a logger leaves out the last ones where they are
+/// empty. A row that was torn is one alone.
+const WRITTEN_SHORT: u32 = 3;
+/// A time and a value.
+const FEWEST_CELLS: usize = 2;
+
+/// Rows one after the other that lack cells at their end.
+#[derive(Debug, Clone, Copy, Default)]
+struct ShortRows {
+    cells: usize,
+    count: u32,
+}
 
 /// Reads the rows under one header.
 #[derive(Debug)]
@@ -22,6 +34,7 @@ pub(super) struct TableRows {
     filled: Vec<bool>,
     /// Columns that have held a number: what is no number in one of them is a fault, in others text.
     numeric: Vec<bool>,
+    short: ShortRows,
     /// What has been found out and not been reported.
     remarks: Vec<Remark>,
     /// What of the last row could not be used, where the rest could.
@@ -34,6 +47,7 @@ impl TableRows {
             file: file.into(),
             filled: vec![false; layout.names.len()],
             numeric: vec![false; layout.names.len()],
+            short: ShortRows::default(),
             remarks: std::mem::take(&mut layout.remarks),
             fault: None,
             vectors: vector::claim(&mut layout, &options.vectors),
@@ -54,16 +68,7 @@ impl TableRows {
         line: u64,
         cells: &StringRecord,
     ) -> Result<Vec<Item>, IngestError> {
-        let expected = self.layout.names.len();
-        let least = expected - self.layout.nameless_at_end();
-        if !(least..=expected).contains(&cells.len()) {
-            return Err(IngestError::Line {
-                file: self.file.clone(),
-                line,
-                found: format!("{} fields", cells.len()),
-                expected,
-            });
-        }
+        let cells = &*self.as_wide_as_the_header(line, cells)?;
         let row = TableRow {
             rows: self,
             cells,
@@ -89,6 +94,58 @@ impl TableRows {
             *filled |= !cell.is_empty();
         }
         Ok(items)
+    }
+
+    /// A row with as many cells as the header has names: what it has more is empty, and what it lacks is, where the rows before lack as much.
+    fn as_wide_as_the_header<'a>(
+        &mut self,
+        line: u64,
+        cells: &'a StringRecord,
+    ) -> Result<Cow<'a, StringRecord>, IngestError> {
+        let expected = self.layout.names.len();
+        let found = cells.len();
+        if found >= expected - self.layout.nameless_at_end() {
+            self.short = ShortRows::default();
+            if cells.iter().skip(expected).all(str::is_empty) {
+                return Ok(Cow::Borrowed(cells));
+            }
+        } else if found >= FEWEST_CELLS {
+            let goes_on = self.short.cells == found;
+            self.short = ShortRows {
+                cells: found,
+                count: if goes_on {
+                    self.short.count.saturating_add(1)
+                } else {
+                    1
+                },
+            };
+            if self.short.count == WRITTEN_SHORT {
+                self.remarks.push(self.written_short(line));
+            }
+            if self.short.count >= WRITTEN_SHORT {
+                let mut whole = cells.clone();
+                (found..expected).for_each(|_| whole.push_field(""));
+                return Ok(Cow::Owned(whole));
+            }
+        }
+        Err(IngestError::Line {
+            file: self.file.clone(),
+            line,
+            found: format!("{found} fields"),
+            expected,
+        })
+    }
+
+    fn written_short(&self, line: u64) -> Remark {
+        let missing = self.layout.names[self.short.cells..].join(", ");
+        Remark::new(
+            format!("line {line}"),
+            format!(
+                "it has {} fields as those before it, {} less than the header: nothing is taken for {missing}",
+                self.short.cells,
+                self.layout.names.len() - self.short.cells
+            ),
+        )
     }
 
     /// Whether no row has held anything so far.

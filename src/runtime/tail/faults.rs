@@ -2,6 +2,7 @@
 
 use super::file::{Content, FileTail};
 use super::follow::Follower;
+use super::text::RefusedRows;
 use crate::reading::counted;
 use crate::runtime::clock;
 use crate::runtime::service_faults::{FaultPlace, ServiceFaultKind};
@@ -12,6 +13,8 @@ use std::time::Duration;
 
 /// A file that has rested for so long is not within the writing of a row.
 const RESTED: Duration = Duration::from_secs(60);
+/// So many rows in a row that cannot be used are no accident: the table has become another one.
+const MOST_REFUSED: u64 = 5;
 /// What was last written longer ago than this is no row that anybody waits for.
 const OF_INTEREST: SignedDuration = SignedDuration::from_hours(24 * 7);
 
@@ -74,9 +77,15 @@ impl FileTail {
             let text = format!("{file} is refused until it is replaced: {why}");
             return Some((ServiceFaultKind::FileRefused, text));
         }
-        let trouble = self.trouble.as_ref()?;
-        let text = format!("{file} cannot be read: {trouble}");
-        Some((ServiceFaultKind::FileUnreadable, text))
+        if let Some(trouble) = &self.trouble {
+            let text = format!("{file} cannot be read: {trouble}");
+            return Some((ServiceFaultKind::FileUnreadable, text));
+        }
+        let RefusedRows { count, why } = &self.refused_rows;
+        (*count >= MOST_REFUSED).then(|| {
+            let text = format!("none of the newest {count} rows of {file} could be used: {why}");
+            (ServiceFaultKind::RowsRefused, text)
+        })
     }
 }
 
@@ -84,6 +93,7 @@ impl FileTail {
 mod tests {
     use super::*;
     use std::fs;
+    use std::io::Write;
 
     /// A follower of `*.csv` in a folder.
     fn follower(folder: &Path) -> Follower {
@@ -123,5 +133,30 @@ mod tests {
             fs::write(folder.path().join(name), format!("{rows}\n")).unwrap();
         }
         assert!(faults(Duration::from_secs(61)).await.is_empty());
+    }
+
+    #[test]
+    fn rows_that_cannot_be_used_are_a_fault_from_the_fifth_in_a_row_until_one_can() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("5.csv");
+        fs::write(&file, "time,displacement_mm\n").unwrap();
+        let mut follower = follower(folder.path());
+        let mut faults = |rows: &str| {
+            let mut file = fs::OpenOptions::new().append(true).open(&file).unwrap();
+            file.write_all(rows.as_bytes()).unwrap();
+            for _ in 0..4 {
+                follower.poll(clock::now());
+            }
+            follower.faults()
+        };
+        assert!(faults("2026-01-01T00:00:00Z,1.0\n").is_empty());
+        assert!(faults(&"2026-01-01T01:00:00Z;1.1\n".repeat(4)).is_empty());
+        let lasting = faults("2026-01-01T01:00:00Z;1.1\n");
+        let [(place, text)] = &lasting[..] else {
+            panic!("{lasting:?}");
+        };
+        assert_eq!(place.kind, ServiceFaultKind::RowsRefused);
+        assert!(text.contains("none of the newest 5 rows"), "{text}");
+        assert!(faults("2026-01-01T01:00:00Z,1.1\n").is_empty());
     }
 }

@@ -3,11 +3,10 @@
 use super::decode::{Arrival, Decoder};
 use super::position::{FileId, Saved};
 use super::records::Channels;
-use super::text::{BadLine, LinesRead, TextReader, Unpacking};
+use super::text::{RefusedRows, TextReader, Unpacking};
 use crate::reading::Timestamp;
 use crate::runtime::clock::Stopwatch;
-use crate::runtime::ingest::{IngestError, Item, is_packed};
-use crate::runtime::site::is_logged;
+use crate::runtime::ingest::{Item, is_packed};
 use std::collections::VecDeque;
 use std::fs::{File, Metadata};
 use std::hash::{DefaultHasher, Hasher};
@@ -32,8 +31,6 @@ const TURN_BYTES: u64 = 1 << 20;
 pub(super) const VALUELESS_BYTES: u64 = 8 << 20;
 /// and after so many it is refused.
 const REFUSED_BYTES: u64 = 1 << 30;
-/// How much of a bad line stands in the log, characters.
-const SHOWN: usize = 200;
 
 /// One followed file.
 #[derive(Debug)]
@@ -64,6 +61,8 @@ pub(super) struct FileTail {
     pub(super) changed: Option<Timestamp>,
     pub(super) pending: VecDeque<Arrival>,
     pub(super) quarantined: u64,
+    /// The newest lines, where all of them could not be used.
+    pub(super) refused_rows: RefusedRows,
     /// The lines of the header of the file that stood under its name before.
     pub(super) header_before: Vec<String>,
     /// The last error, so that it is logged once.
@@ -164,6 +163,7 @@ impl FileTail {
             changed: None,
             pending: VecDeque::new(),
             quarantined: 0,
+            refused_rows: RefusedRows::default(),
             header_before: Vec::new(),
             trouble: None,
             held: None,
@@ -431,61 +431,11 @@ impl FileTail {
         }
     }
 
-    fn take(&mut self, fed: LinesRead) {
-        for remark in fed.remarks {
-            if self.decoder.is_news(&remark) {
-                let file = self.path.display();
-                if remark.is_loss {
-                    tracing::warn!(%file, "{remark}");
-                } else {
-                    tracing::info!(%file, "{remark}");
-                }
-            }
-        }
-        for (_, item) in fed.items {
-            self.expect(item);
-        }
-        let mut bad = fed.bad.into_iter();
-        let last = fed.is_lost.then(|| bad.next_back()).flatten();
-        for line in bad {
-            self.quarantine_line(&line);
-        }
-        if let Some(last) = last {
-            self.refuse(&*last.error);
-        }
-    }
-
     pub(super) fn expect(&mut self, item: Item) {
         if let Some(arrival) = self.decoder.arrival(item) {
             self.newest = self.newest.max(Some(arrival.time));
             self.pending.push_back(arrival);
         }
-    }
-
-    fn quarantine_line(&mut self, line: &BadLine) {
-        self.quarantined += 1;
-        let (file, total) = (self.path.display(), self.quarantined);
-        if !is_logged(total) {
-            return;
-        }
-        let BadLine {
-            number,
-            text,
-            error,
-        } = line;
-        if error.is::<IngestError>() {
-            // Names the file, the line and what stands there.
-            tracing::warn!(%error, total, "line quarantined");
-        } else {
-            let text: String = text.chars().take(SHOWN).collect();
-            tracing::warn!(%file, line = number, text, %error, total, "line quarantined");
-        }
-    }
-
-    pub(super) fn refuse(&mut self, error: &dyn std::error::Error) {
-        self.quarantined += 1;
-        tracing::warn!(file = %self.path.display(), %error, "file refused until it is replaced");
-        self.content = Content::Refused(error.to_string());
     }
 }
 

@@ -16,6 +16,7 @@ mod gap;
 mod known;
 pub mod lines;
 mod position;
+mod quarantine;
 mod recording;
 pub mod records;
 mod reorder;

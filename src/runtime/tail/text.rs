@@ -33,6 +33,31 @@ pub(in crate::runtime) struct LinesRead {
     pub(in crate::runtime) remarks: Vec<Remark>,
 }
 
+/// The newest lines of a file, where none of them could be used.
+#[derive(Debug, Default)]
+pub(super) struct RefusedRows {
+    /// Since the last line of which something could be used.
+    pub(super) count: u64,
+    /// What is wrong with the newest.
+    pub(super) why: String,
+}
+
+impl RefusedRows {
+    /// More lines have been read.
+    pub(super) fn note(&mut self, lines: &LinesRead) {
+        let used = lines.items.last().map(|(number, _)| *number);
+        if used.is_some() {
+            self.count = 0;
+        }
+        // Of a line of which a part can be used the rest is set aside too.
+        let since = |line: &&BadLine| used.is_none_or(|used| line.number > used);
+        for line in lines.bad.iter().filter(since) {
+            self.count += 1;
+            self.why = line.error.to_string();
+        }
+    }
+}
+
 type DecodeFault = Box<dyn Error + Send + Sync>;
 
 /// Where we are in a text.

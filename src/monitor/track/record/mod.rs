@@ -2,6 +2,7 @@
 
 mod ahead;
 mod declared;
+mod set_back;
 
 use crate::alert::Level;
 use crate::fit::{Observations, Rate};
