@@ -257,12 +257,6 @@ impl History {
         self.as_kept(source, reading).value
     }
 
-    /// How many readings are of `time` or later.
-    pub(super) fn count_since(&self, time: Timestamp) -> usize {
-        let values = &self.observations.values;
-        values.len() - values.partition_point(|one| one.t_days < self.days(time))
-    }
-
     /// When the newest reading was taken.
     pub(super) fn newest(&self) -> Option<Timestamp> {
         self.time(self.observations.values.last()?.t_days)

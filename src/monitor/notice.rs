@@ -63,6 +63,14 @@ pub enum Notice {
         /// When the next reading was measured.
         time: Timestamp,
     },
+    /// Readings of this benchmark, the last one of `time`, agree with the host's clock, and earlier ones of it lie ahead of that: the clock of their
+    /// logger has been set back.
+    SetBack {
+        /// Whose.
+        benchmark: BenchmarkId,
+        /// When the last of those that agree was measured.
+        time: Timestamp,
+    },
     /// The newest reading of a benchmark, of `time`, came while the host's clock said `clock`: perhaps ahead of it.
     Came {
         /// Whose.
@@ -94,6 +102,20 @@ pub enum Notice {
 }
 
 impl Monitor {
+    /// What `how` does with what is known of a benchmark, which is to be saved then; nothing without it.
+    fn at_track(
+        &mut self,
+        benchmark: &BenchmarkId,
+        how: impl FnOnce(&mut Track) -> Vec<Event>,
+    ) -> Vec<Event> {
+        let Some(track) = self.benchmarks.get_mut(benchmark) else {
+            return Vec::new();
+        };
+        let events = how(track);
+        self.benchmarks.note_changed(benchmark);
+        events
+    }
+
     pub(super) fn take_notice(&mut self, now: Timestamp, notice: &Notice) -> Vec<Event> {
         match notice {
             Notice::Watching => self.await_unread(now),
@@ -114,40 +136,26 @@ impl Monitor {
             Notice::BatchEnd => self.end_batch(now),
             Notice::BatchGoesOn => self.go_on_with_batch(now),
             Notice::LookBack(benchmark) => self.look_back(now, benchmark),
-            Notice::Behind { benchmark, time } => {
-                if let Some(track) = self.benchmarks.get_mut(benchmark) {
-                    track.is_behind(*time);
-                    self.benchmarks.note_changed(benchmark);
-                }
+            Notice::Behind { benchmark, time } => self.at_track(benchmark, |track| {
+                track.is_behind(*time);
                 Vec::new()
-            }
+            }),
             Notice::Waits {
                 benchmark,
                 time,
                 until,
-            } => {
-                let track = self.benchmarks.get_mut(benchmark);
-                let events = track.map(|track| track.note_waiting(now, *time, *until));
-                self.benchmarks.note_changed(benchmark);
-                events.unwrap_or_default()
-            }
-            Notice::FirstAhead { benchmark, time } => {
-                let track = self.benchmarks.get_mut(benchmark);
-                let event = track.and_then(|track| track.put_first_aside(now, *time));
-                self.benchmarks.note_changed(benchmark);
-                event.into_iter().collect()
-            }
+            } => self.at_track(benchmark, |track| track.note_waiting(now, *time, *until)),
+            Notice::FirstAhead { benchmark, time } => self.at_track(benchmark, |track| {
+                track.put_first_aside(now, *time).into_iter().collect()
+            }),
+            Notice::SetBack { benchmark, time } => self.at_track(benchmark, |track| {
+                track.leave_out_after(*time).into_iter().collect()
+            }),
             Notice::Came {
                 benchmark,
                 time,
                 clock,
-            } => {
-                let track = self.benchmarks.get_mut(benchmark);
-                let events =
-                    track.map_or_else(Vec::new, |track| track.suspect_ahead(now, *time, *clock));
-                self.benchmarks.note_changed(benchmark);
-                events
-            }
+            } => self.at_track(benchmark, |track| track.suspect_ahead(now, *time, *clock)),
             Notice::Passed {
                 until,
                 silences_alone,

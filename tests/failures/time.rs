@@ -325,3 +325,26 @@ fn one_reading_stamped_within_the_hour_keeps_no_honest_one_from_calling_red() {
     let events = site.proven_events();
     assert!(events.contains("leaps-ahead"), "{events}");
 }
+
+/// Its readings from before are of the same minutes as the new ones, as they are of full ones.
+#[test]
+fn a_logger_that_ran_ahead_and_is_set_right_calls_red_with_its_third_reading() {
+    let site = Site::new("[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"50 mm\"\n");
+    let begin = clock::now();
+    let row = |minutes: i64, value: f64| {
+        let time = begin + SignedDuration::from_mins(minutes);
+        format!("{time},{value:.3}\n")
+    };
+    let creep: String = (-60..6).map(|index| row(10 * index, 0.001)).collect();
+    site.append("incoming/5.csv", &format!("{HEADER}{creep}"));
+    let program = site.caught_up();
+    for (taken, minutes) in (67..).zip([-20, -10, 0]) {
+        assert_eq!(site.notified("5/red/", "firing"), 0);
+        site.append("incoming/5.csv", &row(minutes, 100.0 + minutes as f64));
+        eventually("it", || site.values().len() == taken);
+    }
+    eventually("the red", || site.notified("5/red/", "firing") == 1);
+    program.stop();
+    let events = site.proven_events();
+    assert!(events.contains("clock-set-back"), "{events}");
+}

@@ -24,11 +24,9 @@ impl Track {
             self.pending.is_judged();
             return Vec::new();
         }
-        let mut events: Vec<Event> = self.record.end_late_batch().into_iter().collect();
-        let mut judged = self.judge(policy, time, context);
+        let mut events = self.judge(policy, time, context);
         self.forecaster.forget_prepared();
-        self.pending.hold_back(&mut judged);
-        events.extend(judged);
+        self.pending.hold_back(&mut events);
         events
     }
 

@@ -89,6 +89,11 @@ impl Track {
         (self.quality).suspect_ahead(&self.record, now, time, clock)
     }
 
+    /// The clock of its logger has been set back: what is of after `time` is left out.
+    pub(in crate::monitor) fn leave_out_after(&mut self, time: Timestamp) -> Option<Event> {
+        self.record.leave_out_after(time)
+    }
+
     /// What comes now was measured long before `time`, which it is by the clock.
     pub(in crate::monitor) fn is_behind(&mut self, time: Timestamp) {
         self.record.is_behind(time);

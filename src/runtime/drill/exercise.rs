@@ -67,7 +67,7 @@ pub(super) async fn hold(
     let held = exercise
         .held(&file, started, hooks.len(), context, drill)
         .await;
-    exercise.end(hooks.len()).await;
+    Box::pin(exercise.end(hooks.len())).await;
     held
 }
 

@@ -140,6 +140,7 @@ impl Site {
         self.begin_past(arrival, host_time);
         events.extend(self.step(now, &arrival.input));
         events.extend(self.compare_with_clock(arrival, now, host_time));
+        events.extend(self.note_set_back(arrival, host_time));
         for job in self.monitor.searches() {
             self.searches.start(job);
         }

@@ -12,6 +12,7 @@ mod message_rush;
 mod mute;
 mod read_times;
 mod returned;
+mod set_back;
 mod standing;
 mod standing_floods;
 mod timekeeper;
@@ -27,6 +28,7 @@ use message_rush::MessageRush;
 use mute::Mutes;
 use read_times::ReadTimes;
 use returned::Returned;
+use set_back::Agreeing;
 use standing::StandingAlerts;
 use timekeeper::{Lull, Timekeeper};
 use waiting::WaitingReadings;
@@ -122,6 +124,7 @@ pub struct Site {
     returned: Returned,
     /// Messages that come so fast that the past is not over yet.
     rush: MessageRush,
+    agreeing: Agreeing,
     /// Runs since something came late of which more may come in the next batch.
     batch_goes_on: Option<Stopwatch>,
 }
@@ -151,6 +154,7 @@ impl Site {
             waiting: WaitingReadings::default(),
             returned: Returned::default(),
             rush: MessageRush::default(),
+            agreeing: Agreeing::default(),
             batch_goes_on: None,
         }
     }

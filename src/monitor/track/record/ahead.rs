@@ -2,7 +2,6 @@
 //! wrong time stamp all that comes before that time would be late, and nothing would be judged by it.
 
 use super::BenchmarkRecord;
-use super::set_back::SetBackRun;
 use crate::monitor::event::Event;
 use crate::monitor::history::MeasuredAs;
 use crate::reading::{Reading, Timestamp, Unit, days_of};
@@ -40,8 +39,6 @@ pub(in crate::monitor::track) struct LateRun {
     before: Option<Timestamp>,
     last: Option<Timestamp>,
     count: u32,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) set_back: Option<SetBackRun>,
 }
 
 impl LateRun {
@@ -55,7 +52,6 @@ impl LateRun {
 
     /// A reading of `time` has come late.
     fn note(&mut self, time: Timestamp) {
-        self.set_back = Some(SetBackRun::after(self.set_back, time));
         if self.before.is_none_or(|before| time <= before) {
             return;
         }
