@@ -2,10 +2,11 @@
 
 use super::candidates::is_one_wave;
 use super::definition::{Support, Trying};
-use super::judge::{may_be_slip, objection};
+use super::judge::objection;
 use super::noise::Memory;
 use super::objection::{Objection, ObjectionWeight};
 use super::search::{DeclaredPart, Refitted, SIGNIFICANT, Search};
+use super::slip_alike::may_be_slip;
 
 /// So many times the usual margin of the BIC is asked of what only the shape of the readings supports: on walks of .05 to .5 of the white
 /// noise 26 of 32 false ones gained less, and none of 70 true ones.

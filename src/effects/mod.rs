@@ -54,6 +54,7 @@ mod rise;
 mod rival;
 mod search;
 mod shifts;
+mod slip_alike;
 mod slow;
 mod surrogate;
 mod term;
