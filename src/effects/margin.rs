@@ -66,6 +66,13 @@ impl Search<'_> {
         })
     }
 
+    /// Whether it gains the margin, seldom by chance, and nothing of the physics is against it: it is refused because more is asked of its kind.
+    pub(super) fn is_refused_for_its_gain_alone(&self, one: &Refitted) -> bool {
+        let is_between = (self.options.bic_margin..self.margin(one)).contains(&one.gain);
+        let is_seldom = one.p_value < SIGNIFICANT;
+        is_between && is_seldom && objection(self.problem, &one.fitted, self.drivers).is_none()
+    }
+
     /// By how much the BIC has to fall. A walk of the readings that is so small that the law takes it up leaves bends which no noise of the
     /// bank is like: what only the shape of the readings shows, and what happened at a time, has to gain more.
     fn margin(&self, one: &Refitted) -> f64 {

@@ -30,6 +30,7 @@ mod kind;
 mod known;
 mod known_load;
 mod options;
+mod out_of_sample;
 mod outlook;
 mod own_event;
 mod pair;
