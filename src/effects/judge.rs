@@ -30,6 +30,13 @@ impl Compared<'_> {
     }
 }
 
+/// The laws without any effect: by least squares, and under the likeliest noise.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct WithoutAny<'a> {
+    pub(super) plain: &'a Fitted,
+    pub(super) null: &'a Fitted,
+}
+
 /// The later block has at least so many readings.
 const FEWEST_HELD_OUT: usize = 5;
 
@@ -283,6 +290,18 @@ pub(super) fn without_block(
 ) -> Option<Fitted> {
     let (part, starts) = starts_without_block(problem, fitted, from);
     best_of_starts(&part, &starts, scratch)
+}
+
+/// The same from each of the starts, followed until it has arrived: of two laws that predict much the same the one must not seem the better
+/// for where its fit stopped.
+pub(super) fn arrived_without_block(
+    problem: &Problem,
+    fitted: &Fitted,
+    from: usize,
+    scratch: &mut Scratch,
+) -> Option<Fitted> {
+    let (part, starts) = starts_without_block(problem, fitted, from);
+    best_of_all_starts(&part, &starts, scratch)
 }
 
 fn starts_without_block(problem: &Problem, fitted: &Fitted, from: usize) -> (Problem, Vec<Start>) {

@@ -65,6 +65,7 @@ mod velocity_factor;
 mod verdict;
 mod watch;
 mod weights;
+mod whole;
 
 pub use act::Act;
 pub use by_clock::ByClock;

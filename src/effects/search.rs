@@ -6,7 +6,7 @@ use super::definition::Support;
 use super::explanation::Candidate;
 use super::fresh::{best_of_starts, plain_starts};
 use super::inverted::inverted_starts;
-use super::judge::newest_coefficients;
+use super::judge::{WithoutAny, newest_coefficients};
 use super::kind::Kind;
 use super::noise::{Noise, Whitener};
 use super::objection::Judgement;
@@ -260,6 +260,11 @@ impl Search<'_> {
             self.drop_needless(&mut full, &mut accepted);
             self.settle_delays(&mut full);
         }
+        let laws = WithoutAny {
+            plain: &plain,
+            null: &null,
+        };
+        self.judge_together(laws, &mut full, &mut accepted);
         Some(SearchResult {
             plain,
             null,
