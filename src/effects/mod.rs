@@ -40,6 +40,7 @@ mod together;
 
 mod channels;
 mod choice;
+mod late;
 mod linear;
 mod margin;
 mod noise;

@@ -265,6 +265,7 @@ impl Search<'_> {
             null: &null,
         };
         self.judge_together(laws, &mut full, &mut accepted);
+        self.refuse_beside_a_late_covariate(&null, &mut full, &mut accepted);
         Some(SearchResult {
             plain,
             null,
