@@ -29,7 +29,10 @@ impl Search<'_> {
             if rise >= self.options.bic_margin {
                 return;
             }
-            self.note_needless(&full.terms[index], rise);
+            let why = format!(
+                "needless beside what was found after it: without it the BIC rises by {rise:.1} only"
+            );
+            self.refuse_after_all(&full.terms[index], &why);
             accepted.remove(index);
             *full = fitted;
         }
@@ -65,8 +68,8 @@ impl Search<'_> {
         likeliest(problem, fits.into_iter())
     }
 
-    /// Says of an accepted candidate why it is none any more.
-    fn note_needless(&mut self, term: &Term, rise: f64) {
+    /// Says of the accepted candidate that this term is why it is none any more.
+    pub(super) fn refuse_after_all(&mut self, term: &Term, why: &str) {
         let channel = named(term, self.drivers).channel;
         let at = time_of(self.problem, term);
         let own = self.candidates.iter_mut().find(|one| {
@@ -76,9 +79,7 @@ impl Search<'_> {
                 && one.at == at
         });
         if let Some(candidate) = own {
-            candidate.rejected_because = Some(format!(
-                "needless beside what was found after it: without it the BIC rises by {rise:.1} only"
-            ));
+            candidate.rejected_because = Some(why.to_owned());
         }
     }
 }

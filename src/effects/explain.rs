@@ -195,7 +195,7 @@ fn look(
     let Some(mut found) = search.run(ready.plain.clone(), progress) else {
         return (none, remarks);
     };
-    let verdict = conclude(&ready, &mut found, options.bic_margin, &mut scratch);
+    let verdict = conclude(&ready, &mut found, options, &mut scratch);
     let withheld = found.withheld;
     if found.is_daily || has_daily_tide(&verdict.effects, &ready.problem) {
         remarks.push(daily::REMARK.to_owned());

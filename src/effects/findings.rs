@@ -33,6 +33,8 @@ const CLEAR_OF_DIGITS: f64 = 1.5;
 
 const FAILS: &str = "The law fails within the held-out readings: an error larger than all that the readings range over is no figure, and is not given.";
 
+const DRIFTS: &str = "Extrapolated over all held-out readings the error grows: there the law's own drift since the block began counts at every reading. What the effects add shows in the error from reading to reading.";
+
 /// Most stretches of structure that are reported.
 const MOST_STRETCHES: usize = 8;
 
@@ -210,8 +212,11 @@ fn errors(
     };
     let has_failed =
         extrapolated.is_some() && (held_out.before.is_none() || held_out.after.is_none());
+    let both = held_out.before.zip(held_out.after);
+    let grows = both.is_some_and(|(before, after)| after > before);
+    let caveat = has_failed.then_some(FAILS).or(grows.then_some(DRIFTS));
     ErrorChange {
-        caveat: has_failed.then(|| FAILS.to_owned()),
+        caveat: caveat.map(str::to_owned),
         fit: Change {
             before: Some(before.rms(problem, 0..n) / factor),
             after: Some(after.rms(problem, 0..n) / factor),

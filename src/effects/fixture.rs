@@ -128,6 +128,22 @@ pub(super) fn driven_by_the_lake() -> (Series, Vec<Channel>) {
     (series(Quantity::Displacement, &days, &values), channels)
 }
 
+/// 1 mm/day, by a factor of e^0.5 more where the lake is high, and by e^`step` more from day 110 on.
+pub(super) fn lake_and_step(step: f64, seed: u64) -> (Series, Vec<Channel>) {
+    let days = daily(COUNT);
+    let noise = normals(&mut generator(seed), COUNT);
+    let mut moved = 0.0;
+    let each = lake(&days).into_iter().zip(noise).zip(&days);
+    let values = each.map(|((level, noise), day)| {
+        let step = if *day >= 110.0 { step } else { 0.0 };
+        moved += (0.5 * level + step).exp();
+        moved + NOISE * noise
+    });
+    let values: Vec<f64> = values.collect();
+    let level = channel("lake", &days, &lake(&days));
+    (series(Quantity::Displacement, &days, &values), vec![level])
+}
+
 pub(super) fn through(name: &str) -> Cause {
     Cause {
         channel: Some(name.to_owned()),

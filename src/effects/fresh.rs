@@ -4,13 +4,16 @@
 use super::act::Act;
 use super::noise::{Noise, Whitener};
 use super::problem::{Problem, slips};
-use super::refit::{Fitted, Start, refit_from, towards};
+use super::refit::{Fitted, Start, likeliest, refit_from, towards};
 use super::term::{Scratch, Term, law_parameters};
 use crate::reading::Quantity;
 
 /// So many steps from each start, and only the best so many starts are followed to the end.
 const FIRST_STEPS: usize = 8;
 const FOLLOWED: usize = 4;
+/// A fit has arrived where another from its end lowers -2 ln likelihood by less than this; so many more are made at most.
+const ARRIVED: f64 = 0.01;
+const MOST_AGAIN: usize = 25;
 /// Shares of the slip within which a load that answers to the motion has hardly shown.
 const EARLY: [f64; 4] = [0.1, 0.25, 0.5, 0.75];
 /// Lengths of a growing mean, spacings of the readings.
@@ -204,6 +207,31 @@ pub(super) fn best_of_starts(
     let best = refit_from(problem, &leading, &white, scratch)?;
     // What goes along a narrow valley has not arrived after one fit's steps.
     refit_from(problem, &[Start::at(&best)], &white, scratch)
+}
+
+/// The best of many starts by least squares, each of them followed, and the best of them until another fit from its end changes nothing: along a
+/// narrow valley the few steps that choose the leading starts may choose the wrong ones.
+pub(super) fn best_of_all_starts(
+    problem: &Problem,
+    starts: &[Start],
+    scratch: &mut Scratch,
+) -> Option<Fitted> {
+    let white = [Whitener::new(problem, Noise::WHITE)];
+    let leading = best_of_starts(problem, starts, scratch);
+    let each = refit_from(problem, starts, &white, scratch);
+    let mut best = likeliest(problem, leading.into_iter().chain(each))?;
+    for _ in 0..MOST_AGAIN {
+        let again = refit_from(problem, &[Start::at(&best)], &white, scratch);
+        let Some(next) = again.filter(|next| next.deviance < best.deviance) else {
+            break;
+        };
+        let has_arrived = best.deviance - next.deviance < ARRIVED;
+        best = next;
+        if has_arrived {
+            break;
+        }
+    }
+    Some(best)
 }
 
 #[cfg(test)]

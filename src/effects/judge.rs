@@ -2,14 +2,14 @@
 
 use super::act::Act;
 use super::definition::Support;
-use super::fresh::{best_of_starts, fresh_starts};
+use super::fresh::{best_of_all_starts, best_of_starts, fresh_starts};
 use super::kind::{Form, Kind};
 use super::noise::{Memory, Noise, Whitener};
 use super::problem::{Problem, slips};
-use super::quantiles::upper_median;
 use super::refit::{Fitted, Start, likeliest, refit};
 use super::response::Driver;
 use super::rival::Rival;
+use super::slip_alike::is_loosening;
 use super::term::{Scratch, Term, coefficients_of, law_parameters};
 use crate::reading::{CovariateKind, Quantity};
 
@@ -30,33 +30,23 @@ impl Compared<'_> {
     }
 }
 
+/// The laws without any effect: by least squares, and under the likeliest noise.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct WithoutAny<'a> {
+    pub(super) plain: &'a Fitted,
+    pub(super) null: &'a Fitted,
+}
+
 /// The later block has at least so many readings.
 const FEWEST_HELD_OUT: usize = 5;
 
 /// Coefficients are moved to what was learned before the block in so many steps.
 const MOVES: u32 = 8;
 
-/// A jump that took longer than this, days, may be slip.
-const LONGEST_JUMP_DAYS: f64 = 3.0;
-
 /// The error extrapolated over all of the block carries the law's own drift: of what independent data support it may grow by the
 /// first factor at most. A tide comes back to where it was and cannot drift: what grows there is the law's.
 const MOST_EXTRAPOLATED: f64 = 1.2;
 const MOST_OF_A_TIDE: f64 = 10.0;
-
-/// Names of what only ever loosens a slope: more of it, more motion.
-const LOOSENING: [&str; 10] = [
-    "rain",
-    "precip",
-    "flow",
-    "discharge",
-    "pore",
-    "piez",
-    "groundwater",
-    "melt",
-    "snowmelt",
-    "moisture",
-];
 
 /// By what factor the held-out error may grow where it is extrapolated over all of the block; what only the shape of the readings
 /// supports may change the law, and with it no error may grow.
@@ -124,19 +114,6 @@ pub(super) fn objection(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) 
     }
 }
 
-/// Why the newest term, a jump of the reading in the sense of the motion, may be slip of the ground; `None` of any other.
-pub(super) fn may_be_slip(
-    problem: &Problem,
-    fitted: &Fitted,
-    drivers: &[Driver],
-) -> Option<String> {
-    let term = fitted.terms.last()?;
-    let size = *fitted.parameters.last()?;
-    let is_forward = term.is_jump_of_reading() && size > 0.0;
-    let at = term.at.filter(|_| is_forward)?;
-    slip_instead(problem, at, size, drivers)
-}
-
 /// Why the newest term, which happened once, is not judged: a covariate in the law has no values at that time, or none that still acts.
 fn within_a_gap(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) -> Option<String> {
     let (newest, others) = fitted.terms.split_last()?;
@@ -169,44 +146,6 @@ pub(super) fn jumps_at_once(problem: &Problem, fitted: &Fitted) -> bool {
         .collect();
     let largest = steps.iter().copied().fold(0.0, f64::max);
     largest > 0.5 * steps.iter().sum::<f64>()
-}
-
-/// Why a jump in the sense of the motion may be slip and no offset; `None` where a jump back is evidence of the
-/// instrument, or nothing is evidence of slip.
-fn slip_instead(problem: &Problem, at: usize, size: f64, drivers: &[Driver]) -> Option<String> {
-    let level = |range: std::ops::Range<usize>| upper_median(problem.y[range].to_vec());
-    let beside = 5;
-    let comes_back = (beside..problem.t.len() - beside).any(|i| {
-        let fall = level(i - beside..i) - level(i..i + beside);
-        fall > 0.5 * size
-    });
-    if comes_back {
-        return None;
-    }
-    let gap = problem.t[at] - problem.t[at - 1];
-    if gap > LONGEST_JUMP_DAYS {
-        return Some(format!("in {gap:.0} days fast creep would look the same"));
-    }
-    let wet = drivers.iter().find(|driver| {
-        is_loosening(&driver.name)
-            && driver.is_high(problem.t[at] - LONGEST_JUMP_DAYS, problem.t[at])
-    });
-    wet.map(|driver| {
-        format!(
-            "{} is among its highest just before: slip would look the same",
-            driver.name
-        )
-    })
-}
-
-fn is_loosening(name: &str) -> bool {
-    let name = name.to_lowercase();
-    let parts = || name.split(|c: char| !c.is_alphanumeric());
-    // A strain, a drain and a terrain are no rain.
-    LOOSENING.iter().any(|word| match *word {
-        "rain" => parts().any(|part| part.starts_with(word)),
-        _ => name.contains(word),
-    })
 }
 
 /// Errors over the later block without and with the new terms.
@@ -290,8 +229,8 @@ fn shown(problem: &Problem, fitted: &Fitted, term: &Term) -> Option<usize> {
 }
 
 /// Fits both models without the block, by least squares: nothing of it is known to them but the covariates, the shape of
-/// the response, and where a fit to all may start one. Where a load that answers to the motion cannot be learned before the
-/// block, because it had hardly acted, a later block is taken.
+/// the response, and where a fit to all may start one. Where the newest term would be refused for what they predict, they are followed until they
+/// have arrived. Where a load that answers to the motion cannot be learned before the block, because it had hardly acted, a later block is taken.
 pub(super) fn held_out(
     problem: &Problem,
     Compared { before, after }: Compared<'_>,
@@ -299,23 +238,46 @@ pub(super) fn held_out(
     scratch: &mut Scratch,
 ) -> Option<HeldOut> {
     let from = block(problem, &after.terms, share)?;
-    let mut without = |from: usize| {
-        Some(HeldOut {
-            from,
-            before: without_block(problem, before, from, scratch)?,
-            after: without_block(problem, after, from, scratch)?,
-        })
-    };
-    let usual = without(from);
-    let is_learned = usual.as_ref().is_some_and(|held| {
+    let models = Compared { before, after };
+    let mut usual = without_both(problem, models, from, best_of_starts, scratch);
+    let newest = after.terms.last();
+    let most = newest.map_or(1.0, |term| most_extrapolated(term.kind));
+    let grows = |held: &HeldOut, most: f64| {
         let (before, after) = held.errors(problem);
-        after <= before
-    });
-    if is_learned {
+        after.is_nan() || after > most * before
+    };
+    if usual.as_ref().is_none_or(|held| grows(held, most)) {
+        let arrived = without_both(problem, models, from, best_of_all_starts, scratch);
+        usual = arrived.or(usual);
+    }
+    if usual.as_ref().is_some_and(|held| !grows(held, 1.0)) {
         return usual;
     }
     let later = block_once_shown(problem, after).filter(|later| *later > from);
-    later.and_then(without).or(usual)
+    let later =
+        later.and_then(|later| without_both(problem, models, later, best_of_starts, scratch));
+    later.or(usual)
+}
+
+/// Fits without the readings from `from` on, from many starts.
+type FitFromStarts = fn(&Problem, &[Start], &mut Scratch) -> Option<Fitted>;
+
+fn without_both(
+    problem: &Problem,
+    Compared { before, after }: Compared<'_>,
+    from: usize,
+    fit: FitFromStarts,
+    scratch: &mut Scratch,
+) -> Option<HeldOut> {
+    let mut without = |fitted: &Fitted| {
+        let (part, starts) = starts_without_block(problem, fitted, from);
+        fit(&part, &starts, scratch)
+    };
+    Some(HeldOut {
+        from,
+        before: without(before)?,
+        after: without(after)?,
+    })
 }
 
 /// The law with the terms of `fitted` by least squares from fresh starts and from there, without the readings from `from`
@@ -326,10 +288,27 @@ pub(super) fn without_block(
     from: usize,
     scratch: &mut Scratch,
 ) -> Option<Fitted> {
+    let (part, starts) = starts_without_block(problem, fitted, from);
+    best_of_starts(&part, &starts, scratch)
+}
+
+/// The same from each of the starts, followed until it has arrived: of two laws that predict much the same the one must not seem the better
+/// for where its fit stopped.
+pub(super) fn arrived_without_block(
+    problem: &Problem,
+    fitted: &Fitted,
+    from: usize,
+    scratch: &mut Scratch,
+) -> Option<Fitted> {
+    let (part, starts) = starts_without_block(problem, fitted, from);
+    best_of_all_starts(&part, &starts, scratch)
+}
+
+fn starts_without_block(problem: &Problem, fitted: &Fitted, from: usize) -> (Problem, Vec<Start>) {
     let part = problem.trained_on(from);
     let mut starts = fresh_starts(&part, &fitted.terms);
     starts.push(in_units_of(&part, problem, fitted));
-    best_of_starts(&part, &starts, scratch)
+    (part, starts)
 }
 
 /// The later block predicted reading after reading, each from those before it.

@@ -2,10 +2,11 @@
 
 use super::candidates::is_one_wave;
 use super::definition::{Support, Trying};
-use super::judge::{may_be_slip, objection};
+use super::judge::objection;
 use super::noise::Memory;
 use super::objection::{Objection, ObjectionWeight};
 use super::search::{DeclaredPart, Refitted, SIGNIFICANT, Search};
+use super::slip_alike::may_be_slip;
 
 /// So many times the usual margin of the BIC is asked of what only the shape of the readings supports: on walks of .05 to .5 of the white
 /// noise 26 of 32 false ones gained less, and none of 70 true ones.
@@ -63,6 +64,13 @@ impl Search<'_> {
             let slip = is_open.then(|| may_be_slip(problem, fitted, drivers))?;
             slip.map(may_have_acted)
         })
+    }
+
+    /// Whether it gains the margin, seldom by chance, and nothing of the physics is against it: it is refused because more is asked of its kind.
+    pub(super) fn is_refused_for_its_gain_alone(&self, one: &Refitted) -> bool {
+        let is_between = (self.options.bic_margin..self.margin(one)).contains(&one.gain);
+        let is_seldom = one.p_value < SIGNIFICANT;
+        is_between && is_seldom && objection(self.problem, &one.fitted, self.drivers).is_none()
     }
 
     /// By how much the BIC has to fall. A walk of the readings that is so small that the law takes it up leaves bends which no noise of the

@@ -15,6 +15,9 @@ pub(super) const MOST_READINGS: usize = 3000;
 const NODES: f64 = 1500.0;
 /// No more nodes than this between two readings, where they stand evenly: a response smooths what is finer.
 const NODES_A_READING: f64 = 4.0;
+/// Where the most nodes a reading are no more than this altogether they cost little, and the law is solved on them whatever the channels are: what is
+/// found of few readings is not to depend on how often a channel is read that has nothing to do with it.
+const FEW_NODES: f64 = 400.0;
 /// Of the largest reading.
 const FINEST: f64 = 1e-9;
 /// Share of the usual velocity under which a load has no hold on the noise: there the readings give no velocity.
@@ -215,7 +218,13 @@ fn channel_spacing(channel: &Channel) -> Option<f64> {
 fn nodes(t: &[f64], averaging_days: f64, fine: f64) -> (Vec<f64>, Vec<usize>) {
     let span = t[t.len() - 1] - t[0];
     let usual = upper_median(t.windows(2).map(|pair| pair[1] - pair[0]).collect());
-    let step = fine.max(span / NODES).max(usual / NODES_A_READING);
+    let finest = usual / NODES_A_READING;
+    let fine = if span <= FEW_NODES * finest {
+        finest
+    } else {
+        fine
+    };
+    let step = fine.max(span / NODES).max(finest);
     let (mut nodes, mut node_of) = (Vec::new(), Vec::new());
     if averaging_days > 0.0 {
         nodes.push(t[0] - averaging_days);

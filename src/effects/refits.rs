@@ -238,10 +238,18 @@ impl<'a> Search<'a> {
     pub(super) fn refitted(&mut self, base: &Fitted, term: &Term) -> Option<Refitted> {
         let problem = self.problem;
         let mut fitted = self.best_start(base, term)?;
-        if base.bic(problem) - fitted.bic(problem) > 0.0 {
+        let is_beside = is_event_beside(base, term);
+        // The delays beside an event were found without it: with others it may gain a margin more.
+        let least = if is_beside {
+            -self.options.bic_margin
+        } else {
+            0.0
+        };
+        if base.bic(problem) - fitted.bic(problem) > least {
             self.sharpen(&mut fitted);
-            if is_event_beside(base, term) {
+            if is_beside {
                 self.settle_delays(&mut fitted);
+                self.sharpen(&mut fitted);
             }
         }
         if matches!(term.act, Act::Friction(_)) {
@@ -479,3 +487,6 @@ fn best_of_each_response(mut all: Vec<Refitted>, margin: f64) -> Vec<Refitted> {
     }
     best
 }
+
+#[cfg(test)]
+mod tests;

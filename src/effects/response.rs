@@ -197,6 +197,18 @@ impl Driver {
         }
     }
 
+    /// The same covariate with its values so many days earlier.
+    pub(super) fn earlier(&self, days: f64) -> Self {
+        let gaps = self.gaps.iter();
+        Self {
+            start: self.start - days,
+            gaps: gaps
+                .map(|(from, until)| (from - days, until - days))
+                .collect(),
+            ..self.clone()
+        }
+    }
+
     /// The same covariate shifted by a share of its record, and backwards if `mirrored`: a level by its changes, so that none comes in
     /// where its end meets its beginning, what fell by its amounts.
     pub(super) fn moved_by(&self, share: f64, mirrored: bool) -> Self {

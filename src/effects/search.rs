@@ -6,13 +6,10 @@ use super::definition::Support;
 use super::explanation::Candidate;
 use super::fresh::{best_of_starts, plain_starts};
 use super::inverted::inverted_starts;
-use super::judge::{
-    Compared, HeldOut, StepErrors, block, held_out, most_extrapolated, newest_coefficients,
-    step_errors,
-};
+use super::judge::{WithoutAny, newest_coefficients};
 use super::kind::Kind;
 use super::noise::{Noise, Whitener};
-use super::objection::{Judgement, Objection, ObjectionWeight};
+use super::objection::Judgement;
 use super::options::Options;
 use super::problem::Problem;
 use super::refit::{Fitted, Start, refit_every_memory};
@@ -20,18 +17,12 @@ use super::response::Driver;
 use super::rival::Rival;
 use super::surrogate::NullGains;
 use super::term::{Scratch, Term, law_parameters, time_of};
-use crate::reading::{Timestamp, figure};
+use crate::reading::Timestamp;
 
 /// Most effects in one law.
 const MOST_EFFECTS: usize = 10;
 /// A search's p-value must lie under this.
 pub(super) const SIGNIFICANT: f64 = 0.01;
-/// The later block is predicted no worse from reading to reading: neither in -2 ln likelihood, by more than the first, nor in
-/// the errors, by more than the second factor.
-const WORSE: f64 = 2.0;
-const WORSE_STEPS: f64 = 1.005;
-/// A held-out error that is so many times as large is no figure.
-const RUNS_AWAY: f64 = 1000.0;
 
 /// So much of the usual starts' error the law of an inversion must leave at most.
 const FAR_NEARER: f64 = 0.7;
@@ -269,6 +260,12 @@ impl Search<'_> {
             self.drop_needless(&mut full, &mut accepted);
             self.settle_delays(&mut full);
         }
+        let laws = WithoutAny {
+            plain: &plain,
+            null: &null,
+        };
+        self.judge_together(laws, &mut full, &mut accepted);
+        self.refuse_beside_a_late_covariate(&null, &mut full, &mut accepted);
         Some(SearchResult {
             plain,
             null,
@@ -302,7 +299,8 @@ impl Search<'_> {
     /// Why not; `None` for what may be accepted. The held-out error with it over that without comes first.
     pub(super) fn judged(&mut self, base: &Fitted, one: &Refitted) -> Judgement {
         if let Some(reason) = self.refused_at_once(one) {
-            return (None, Some(reason));
+            let after_all = self.predicted_after_all(base, one);
+            return after_all.map_or((None, Some(reason)), |held| (Some(held), None));
         }
         if let Some(reason) = self.daily_instead(base, one) {
             return (None, Some(reason.into()));
@@ -330,116 +328,6 @@ impl Search<'_> {
                 bic_gain: one.gain,
             });
         }
-    }
-
-    /// The held-out error with `one` over that without, and why it is evidence against it.
-    fn held_out(&mut self, base: &Fitted, one: &Refitted) -> Judgement {
-        let share = self.options.held_out_share;
-        if block(self.problem, &one.fitted.terms, share).is_none() {
-            // A short record has none, and a step that has only just come says so by its date.
-            let is_late =
-                block(self.problem, &[], share).is_some() && !one.term.kind.fits_any_bend();
-            let reason =
-                "an event stands too late for a later block by which to judge it".to_owned();
-            return (None, is_late.then(|| reason.into()));
-        }
-        let models = Compared {
-            before: base,
-            after: &one.fitted,
-        };
-        let Some(held) = held_out(self.problem, models, share, &mut self.scratch) else {
-            let reason = "without the later block it cannot be fitted".to_owned();
-            return (None, Some(reason.into()));
-        };
-        let (before, after) = held.errors(self.problem);
-        let ratio = after / before.max(1e-300);
-        // Where the law runs away within the block also without a covariate, that says nothing of it: what happens from reading to reading does.
-        let is_judged = one.term.kind.definition().support != Support::Covariate
-            || StepErrors::is_a_figure(self.problem, after)
-            || StepErrors::is_a_figure(self.problem, before);
-        if is_judged && (!ratio.is_finite() || ratio > most_extrapolated(one.term.kind)) {
-            let reason = if ratio <= RUNS_AWAY {
-                format!("the held-out error grows to {} %", figure(100.0 * ratio, 1))
-            } else {
-                "with it the held-out error is over a thousand times as large".to_owned()
-            };
-            return (
-                Some(ratio).filter(|ratio| ratio.is_finite()),
-                Some(reason.into()),
-            );
-        }
-        let reason = self.worse_from_reading_to_reading(base, one, &held);
-        let reason = reason.or_else(|| {
-            self.worse_than_without_any(base, one, &held)
-                .map(Objection::from)
-        });
-        (Some(ratio).filter(|_| is_judged), reason)
-    }
-
-    /// Why not, by all effects together: what improves on a law with effects may in its own later block still be worse than the law
-    /// without any, and the errors that are reported are those.
-    fn worse_than_without_any(
-        &mut self,
-        base: &Fitted,
-        one: &Refitted,
-        held: &HeldOut,
-    ) -> Option<String> {
-        let models = Compared {
-            before: self.null.as_ref().filter(|_| !base.terms.is_empty())?,
-            after: &one.fitted,
-        };
-        let (newest, scratch) = (models.newest(), &mut self.scratch);
-        let steps = step_errors(self.problem, models, held.from, newest, scratch)?;
-        let share = share_grown_to(self.problem, steps.before, steps.after);
-        share.map(|share| {
-            format!("with it all effects together predict the held-out readings worse than none: {share:.0} % of the error from reading to reading")
-        })
-    }
-
-    /// Why not, by the held-out readings, each predicted from those before it: what only the shape of the readings supports may
-    /// have changed the law, and is judged with the law as it was learned before the block.
-    fn worse_from_reading_to_reading(
-        &mut self,
-        base: &Fitted,
-        one: &Refitted,
-        held: &HeldOut,
-    ) -> Option<Objection> {
-        let models = Compared {
-            before: base,
-            after: &one.fitted,
-        };
-        let newest = models.newest();
-        let (before, after) = if one.term.kind.fits_any_bend() {
-            held.errors_of_changes(self.problem)
-        } else {
-            let steps = step_errors(self.problem, models, held.from, newest, &mut self.scratch);
-            match steps.filter(|steps| steps.after.is_finite() && steps.deviance.is_finite()) {
-                None => {
-                    let why = "as it is learned before the later block, the readings cannot be fitted with it";
-                    return Some(why.to_owned().into());
-                }
-                Some(steps) if steps.deviance > WORSE => {
-                    let worse = steps.deviance;
-                    let why = format!(
-                        "the held-out readings are less likely with it, by {worse:.1} in -2 ln likelihood"
-                    );
-                    return Some(why.into());
-                }
-                Some(steps) => (steps.before, steps.after),
-            }
-        };
-        let share = share_grown_to(self.problem, before, after)?;
-        // So much do the squares of so few errors grow at a likelihood that may be accepted.
-        let readings = self.problem.t.len() - held.from;
-        let is_within_chance = (share / 100.0).powi(2) <= 1.0 + WORSE / readings as f64;
-        Some(Objection {
-            why: format!("from reading to reading the held-out error grows to {share:.0} %"),
-            weight: if is_within_chance {
-                ObjectionWeight::WithinChance
-            } else {
-                ObjectionWeight::Against
-            },
-        })
     }
 
     pub(super) fn note(
@@ -478,12 +366,6 @@ impl Search<'_> {
         (self.candidates).retain(|old| !is_same(old) || old.rejected_because.is_none());
         self.candidates.push(candidate);
     }
-}
-
-/// To what share an error from reading to reading grows, %; `None` where it does not, or where the one before is no figure.
-fn share_grown_to(problem: &Problem, before: f64, after: f64) -> Option<f64> {
-    let is_worse = after > WORSE_STEPS * before && StepErrors::is_a_figure(problem, before);
-    is_worse.then(|| 100.0 * after / before.max(1e-300))
 }
 
 #[cfg(test)]

@@ -7,9 +7,10 @@ use super::definition::{EffectSize, FittedCoefficients};
 use super::diagnosis::{Judged, innovations, newest_off};
 use super::explanation::{Candidate, Effect, Explained};
 use super::gain_interval;
-use super::judge::{coefficients, named};
+use super::judge::{WithoutAny, coefficients, named};
 use super::kind::Kind;
 use super::noise::{Memory, Whitener};
+use super::options::Options;
 use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::{Fitted, Start, refit, under_likeliest};
@@ -18,6 +19,7 @@ use super::rival::Rival;
 use super::search::{Accepted, SIGNIFICANT, SearchResult};
 use super::term::{Scratch, Term, law_parameters, time_of};
 use super::velocity_factor;
+use super::whole::is_worse_than_none;
 use crate::reading::{Quantity, Unit};
 
 /// What the search is concluded to mean.
@@ -54,10 +56,10 @@ const RUNS_AWAY: f64 = 30.0;
 pub(super) fn conclude(
     ready: &Ready,
     found: &mut SearchResult,
-    margin: f64,
+    options: &Options,
     scratch: &mut Scratch,
 ) -> Verdict {
-    let problem = &ready.problem;
+    let (problem, margin) = (&ready.problem, options.bic_margin);
     let mut full = found.full.clone();
     let mut accepted = found.accepted.clone();
     let mut judged = Judged::of(problem, &full, &ready.bank, scratch);
@@ -69,7 +71,7 @@ pub(super) fn conclude(
     let is_whole = !left && accounts_for_all(problem, &full);
     if only_labels && !is_whole {
         left = true;
-        let (stays, kept) = what_stands(ready, found, &full, margin, scratch);
+        let (stays, kept) = what_stands(ready, found, &full, options, scratch);
         for (index, term) in full.terms.iter().enumerate() {
             if !kept.contains(&index) {
                 cannot_separate_from.push(named(term, &ready.drivers));
@@ -239,14 +241,23 @@ fn what_stands(
     ready: &Ready,
     found: &SearchResult,
     full: &Fitted,
-    margin: f64,
+    options: &Options,
     scratch: &mut Scratch,
 ) -> (Fitted, Vec<usize>) {
+    let (problem, margin) = (&ready.problem, options.bic_margin);
     if stands_out(full, &found.candidates, margin) {
         // What is left is little beside it.
         return (full.clone(), vec![0]);
     }
+    let laws = WithoutAny {
+        plain: &found.plain,
+        null: &found.null,
+    };
+    let share = options.held_out_share;
     let sharp = sharp_alone(ready, full, &found.accepted, margin, scratch);
+    // Without the others they may predict the later block worse than none does.
+    let sharp =
+        sharp.filter(|(stays, _)| !is_worse_than_none(problem, laws, stays, share, scratch));
     sharp.unwrap_or_else(|| (found.null.clone(), Vec::new()))
 }
 

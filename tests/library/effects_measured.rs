@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use slipwatch::effects::{
     Effect, Explained, Explanation, FaultKind, Form, Kind, Options, explain, remarks,
 };
-use slipwatch::reading::{BenchmarkId, Recording, Series, Timestamp, days_since};
+use slipwatch::reading::{BenchmarkId, Channel, Recording, Sample, Series, Timestamp, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -219,6 +219,42 @@ fn baishuihes_copied_row_is_named_and_the_slope_explained_in_part() {
     assert_eq!(copied.at, time("2011-03-01T00:00:00+08:00"));
     assert_eq!(copied.copy_of, Some(time("2008-01-01T00:00:00+08:00")));
     assert_eq!(said.explained, Explained::Partly);
+}
+
+/// A counter that is read daily beside monthly readings.
+fn beside_a_daily_counter(file: &str) -> [Explanation; 2] {
+    let mut recording = read(&[measured(file)]);
+    let alone = explained(&recording, None);
+    let first = series(&recording, None).readings[0].time;
+    let samples = (0..2200).map(|day| Sample {
+        time: first + SignedDuration::from_hours(24 * day),
+        value: f64::from(u8::try_from(day % 2).unwrap()),
+    });
+    recording.channels.push(Channel {
+        name: "counter".to_owned(),
+        unit: None,
+        stated: None,
+        samples: samples.collect(),
+    });
+    [alone, explained(&recording, None)]
+}
+
+/// Of Baishuihe rain was lost beside it, and of Bazimen the level's gain was .7 of what it is alone.
+#[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
+fn a_daily_column_that_has_nothing_to_do_with_them_changes_nothing_found_in_monthly_readings() {
+    for (file, channel) in [
+        ("baishuihe_2006.csv", "rain_month_mm"),
+        ("bazimen_2006.csv", "reservoir_level_m"),
+    ] {
+        let [alone, beside] = beside_a_daily_counter(file);
+        assert_eq!(alone.verdict.channel.as_deref(), Some(channel));
+        assert_eq!(beside.verdict.channel, alone.verdict.channel);
+        assert_eq!(beside.verdict.form, alone.verdict.form);
+        assert_eq!(beside.verdict.gain_per_sd, alone.verdict.gain_per_sd);
+        assert_eq!(beside.error.held_out, alone.error.held_out);
+        assert_eq!(effects(&beside).len(), effects(&alone).len());
+    }
 }
 
 /// The rms of `values` about a cubic spline with knots every two days, by least squares.

@@ -5,6 +5,7 @@ use crate::effects::fixture::{channel, daily, epoch, generator, normals, steady}
 use crate::effects::kind::Kind;
 use crate::effects::noise::Noise;
 use crate::effects::response::Response;
+use crate::effects::slip_alike::may_be_slip;
 use crate::reading::Quantity;
 
 const COUNT: usize = 300;

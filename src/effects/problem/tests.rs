@@ -35,17 +35,33 @@ fn every_reading_stands_on_a_node_and_nodes_increase() {
 
 #[test]
 fn a_finer_channel_brings_finer_nodes_within_bounds() {
-    let days: Vec<f64> = (0..100).map(|k| 10.0 * f64::from(k)).collect();
+    let days: Vec<f64> = (0..200).map(|k| 10.0 * f64::from(k)).collect();
     let readings = series(Quantity::Displacement, &days, &days);
     let alone = Problem::new(&readings, &[]).unwrap();
-    assert_eq!(alone.nodes.len(), 100);
-    let each_day = channel("rain_mm", &daily(1000), &normals(&mut generator(1), 1000));
+    assert_eq!(alone.nodes.len(), 200);
+    let each_day = channel("rain_mm", &daily(2000), &normals(&mut generator(1), 2000));
     let beside = Problem::new(&readings, &[each_day]).unwrap();
     assert!(
-        (300..=500).contains(&beside.nodes.len()),
+        (600..=1000).contains(&beside.nodes.len()),
         "{}",
         beside.nodes.len()
     );
+}
+
+/// Monthly readings of six years, as those of the Three Gorges.
+#[test]
+fn few_readings_are_solved_on_the_same_nodes_beside_any_channel() {
+    let days: Vec<f64> = (0..73).map(|k| 30.4 * f64::from(k)).collect();
+    let readings = series(Quantity::Displacement, &days, &days);
+    let alone = Problem::new(&readings, &[]).unwrap();
+    assert!(
+        (280..=300).contains(&alone.nodes.len()),
+        "{}",
+        alone.nodes.len()
+    );
+    let each_day = channel("counter", &daily(2200), &normals(&mut generator(1), 2200));
+    let beside = Problem::new(&readings, &[each_day]).unwrap();
+    assert_eq!(beside.nodes, alone.nodes);
 }
 
 #[test]
