@@ -10,6 +10,8 @@ use super::search::{Accepted, DeclaredPart, Refitted, SIGNIFICANT, Search};
 /// A covariate is tried so many times earlier, by up to this share of the record.
 const TIMES: usize = 24;
 const FARTHEST: f64 = 0.1;
+/// What is hours early may be a daily wave in another phase.
+const NEAREST_DAYS: f64 = 1.0;
 /// By so many margins of the BIC it must explain more than all that was found, which it would else only resemble.
 const LEADS: f64 = 4.0;
 
@@ -56,7 +58,7 @@ impl Search<'_> {
     fn logged_late(&mut self, null: &Fitted, found: f64) -> Option<(Refitted, f64)> {
         let asked = found.max(0.0) + LEADS * self.options.bic_margin;
         let best = self.best_earlier(null)?;
-        if best.gain < 0.5 * asked {
+        if best.gain < 0.5 * asked || best.days < NEAREST_DAYS {
             return None;
         }
         let one = self.refitted_through(null, &best.driver)?;

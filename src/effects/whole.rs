@@ -7,7 +7,7 @@ use super::judge::{
 use super::problem::Problem;
 use super::refit::Fitted;
 use super::search::{Accepted, Search};
-use super::term::Scratch;
+use super::term::{Scratch, Term};
 
 /// The errors over a later block, mm or mm/day.
 #[derive(Debug, Clone, Copy)]
@@ -34,6 +34,8 @@ struct Whole {
     /// The errors from reading to reading, mm or mm/day.
     before: f64,
     after: f64,
+    /// Whether the error extrapolated over all of the block falls.
+    extrapolates_nearer: bool,
 }
 
 impl Whole {
@@ -50,6 +52,7 @@ impl Whole {
             after: full,
         };
         let held = held_out(problem, by_least_squares, share, scratch)?;
+        let (plain, extrapolated) = held.errors(problem);
         let models = Compared {
             before: laws.null,
             after: full,
@@ -59,12 +62,16 @@ impl Whole {
             from: held.from,
             before: steps.before,
             after: steps.after,
+            extrapolates_nearer: extrapolated < plain,
         })
     }
 
-    /// Whether the readings of the block are predicted worse with the effects than without any, each from those before it.
+    /// Whether the readings of the block are predicted worse with the effects than without any, each from those before it, and no better over all
+    /// of it. From reading to reading a law with many readings between its bends is as good as any, and its noise decides.
     fn is_worse(&self, problem: &Problem) -> bool {
-        self.after > self.before && StepErrors::is_a_figure(problem, self.before)
+        self.after > self.before
+            && !self.extrapolates_nearer
+            && StepErrors::is_a_figure(problem, self.before)
     }
 }
 
@@ -90,6 +97,11 @@ impl Search<'_> {
         accepted: &mut Vec<Accepted>,
     ) {
         let (problem, share) = (self.problem, self.options.held_out_share);
+        // What blurs the readings, or has happened once, says nothing of what comes.
+        let says_what_comes = |term: &Term| term.kind.definition().says_what_comes;
+        if !full.terms.iter().any(says_what_comes) {
+            return;
+        }
         while !full.terms.is_empty() {
             let whole = Whole::of(problem, laws, full, share, &mut self.scratch);
             let Some(whole) = whole else { return };
