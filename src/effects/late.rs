@@ -5,7 +5,7 @@ use super::candidates::{delays, in_load, is_one_wave, responses};
 use super::kind::{Form, Kind};
 use super::refit::Fitted;
 use super::response::Driver;
-use super::search::{Accepted, DeclaredPart, Refitted, SIGNIFICANT, Search};
+use super::search::{Accepted, Refitted, SIGNIFICANT, Search};
 
 /// A covariate is tried so many times earlier, by up to this share of the record.
 const TIMES: usize = 24;
@@ -115,21 +115,7 @@ impl Search<'_> {
     /// The best refit with the one covariate.
     fn refitted_through(&mut self, null: &Fitted, driver: &Driver) -> Option<Refitted> {
         let drivers = [driver.clone()];
-        let mut other = Search {
-            problem: self.problem,
-            drivers: &drivers,
-            bank: self.bank,
-            options: self.options,
-            is_drawn: self.is_drawn,
-            declared: DeclaredPart::Nothing,
-            scratch: std::mem::take(&mut self.scratch),
-            candidates: Vec::new(),
-            withheld: None,
-            may_have_acted: Vec::new(),
-            is_daily: false,
-            is_slow_alike: false,
-            null: None,
-        };
+        let mut other = self.through_others(&drivers);
         let ground = other.ground(null);
         let found = ground.map(|ground| other.through_covariates(null, &ground, None));
         self.scratch = other.scratch;

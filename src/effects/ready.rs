@@ -6,7 +6,7 @@ use super::options::Options;
 use super::problem::Problem;
 use super::refit::Fitted;
 use super::response::Driver;
-use super::search::{DeclaredPart, Search, plain};
+use super::search::{Search, plain};
 use super::term::Scratch;
 use crate::reading::{Channel, Series, Unit};
 
@@ -45,20 +45,6 @@ impl Ready {
 
     /// The search, before anything was tried; `is_drawn`: the values are smoother than any instrument's.
     pub(super) fn search<'a>(&'a self, options: &'a Options, is_drawn: bool) -> Search<'a> {
-        Search {
-            problem: &self.problem,
-            drivers: &self.drivers,
-            bank: &self.bank,
-            options,
-            is_drawn,
-            declared: DeclaredPart::Nothing,
-            scratch: Scratch::default(),
-            candidates: Vec::new(),
-            withheld: None,
-            may_have_acted: Vec::new(),
-            is_daily: false,
-            is_slow_alike: false,
-            null: None,
-        }
+        Search::new(&self.problem, &self.drivers, &self.bank, options, is_drawn)
     }
 }

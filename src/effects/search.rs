@@ -118,6 +118,50 @@ pub(super) struct Search<'a> {
     pub(super) null: Option<Fitted>,
 }
 
+impl<'a> Search<'a> {
+    /// Before anything was tried; `is_drawn`: the values are smoother than any instrument's.
+    pub(super) fn new(
+        problem: &'a Problem,
+        drivers: &'a [Driver],
+        bank: &'a [Whitener],
+        options: &'a Options,
+        is_drawn: bool,
+    ) -> Self {
+        Self {
+            problem,
+            drivers,
+            bank,
+            options,
+            is_drawn,
+            declared: DeclaredPart::Nothing,
+            scratch: Scratch::default(),
+            candidates: Vec::new(),
+            withheld: None,
+            may_have_acted: Vec::new(),
+            is_daily: false,
+            is_slow_alike: false,
+            null: None,
+        }
+    }
+
+    /// The same through other covariates, before anything was tried. It has the scratch of this one, which is to be given back.
+    pub(super) fn through_others<'b>(&mut self, drivers: &'b [Driver]) -> Search<'b>
+    where
+        'a: 'b,
+    {
+        Search {
+            scratch: std::mem::take(&mut self.scratch),
+            ..Search::new(
+                self.problem,
+                drivers,
+                self.bank,
+                self.options,
+                self.is_drawn,
+            )
+        }
+    }
+}
+
 /// A refitted candidate.
 pub(super) struct Refitted {
     pub(super) term: Term,

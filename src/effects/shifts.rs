@@ -4,7 +4,7 @@
 use super::judge::objection;
 use super::refit::Fitted;
 use super::response::Driver;
-use super::search::{DeclaredPart, Refitted, SIGNIFICANT, Search};
+use super::search::{Refitted, SIGNIFICANT, Search};
 use super::surrogate::{LEAST_SHIFT, WholeGains};
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -70,21 +70,7 @@ impl Search<'_> {
     fn gain_of_shifted(&mut self, base: &Fitted, share: f64, mirrored: bool) -> f64 {
         let shifted = self.drivers.iter();
         let shifted: Vec<Driver> = shifted.map(|own| own.moved_by(share, mirrored)).collect();
-        let mut other = Search {
-            problem: self.problem,
-            drivers: &shifted,
-            bank: self.bank,
-            options: self.options,
-            is_drawn: self.is_drawn,
-            declared: DeclaredPart::Nothing,
-            scratch: std::mem::take(&mut self.scratch),
-            candidates: Vec::new(),
-            withheld: None,
-            may_have_acted: Vec::new(),
-            is_daily: false,
-            is_slow_alike: false,
-            null: None,
-        };
+        let mut other = self.through_others(&shifted);
         let steady = other.steady_law(base);
         let steady = steady.as_ref().and_then(|law| other.ground(law));
         let ground = other.ground(base);
