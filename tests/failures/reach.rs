@@ -54,7 +54,7 @@ fn note(hook: &str) -> String {
 
 const FAILING: &str = "[[hook]]\nrun = [\"/bin/sh\", \"fail.sh\"]\nlevels = [\"red\"]\n";
 
-fn alerts(site: &Site, words: &[&str]) {
+pub(crate) fn alerts(site: &Site, words: &[&str]) {
     let more = ["--by", "Ada", "--config", "site.toml"];
     site.printed(&[&["alerts"], words, &more].concat());
 }
@@ -64,7 +64,7 @@ fn resolves(site: &Site) {
 }
 
 /// Waits until an order stands in the events.
-fn taken(site: &Site, order: &str) {
+pub(crate) fn taken(site: &Site, order: &str) {
     eventually("that the order is taken", || {
         let events = [
             "events",

@@ -1,6 +1,7 @@
 //! Clocks that are wrong: the host's, and those of loggers.
 
 use crate::machine::{another_clock, by_another_clock};
+use crate::reach::{alerts, taken};
 use crate::site::{PROGRAM, Site, eventually, get};
 use crate::telling::failing;
 use jiff::{SignedDuration, Timestamp};
@@ -347,4 +348,21 @@ fn a_logger_that_ran_ahead_and_is_set_right_calls_red_with_its_third_reading() {
     program.stop();
     let events = site.proven_events();
     assert!(events.contains("clock-set-back"), "{events}");
+}
+
+/// It lasts the time it was given for, and not as much longer as the clock was set back.
+#[test]
+#[cfg_attr(not(has_faketime), ignore = "libfaketime was not found by build.rs")]
+fn a_clock_that_is_set_back_by_less_than_counts_as_wrong_prolongs_no_silence() {
+    let site = Site::new(POLICY);
+    site.append("incoming/5.csv", &format!("{HEADER}{},1\n", clock::now()));
+    fs::write(site.path("ahead"), "+0").unwrap();
+    let program = by_another_clock(&site);
+    alerts(&site, &["silence", "--for", "6s"]);
+    taken(&site, "silence");
+    fs::write(site.path("ahead"), "-50m").unwrap();
+    eventually("its end", || {
+        site.log().contains("were not reported has ended")
+    });
+    program.stop();
 }

@@ -65,6 +65,7 @@ impl Site {
                 to_send.push(end);
             }
         }
+        self.mutes.start(host_time);
         self.mute_what_is_in_hand(host_time);
         self.record_and_send(&to_send)
     }

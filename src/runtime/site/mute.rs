@@ -5,12 +5,13 @@ use super::standing::Attention;
 use crate::alert::Level;
 use crate::monitor::{AlertState, EventKind, Order};
 use crate::reading::{BenchmarkId, Timestamp};
-use crate::runtime::clock::TOLERANCE;
+use crate::runtime::clock::{Stopwatch, TOLERANCE};
 use crate::runtime::hook::Alert;
 use crate::runtime::standing::{every_since, lasts};
 use crate::store::StoreError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::time::Duration;
 
 /// Orders in force at most; the oldest goes.
 const MOST: usize = 256;
@@ -44,10 +45,36 @@ impl Mute {
     }
 }
 
+/// An order, and the time that it has left by a stopwatch: a clock that is set back by less than what counts as wrong does not
+/// prolong it.
+#[derive(Debug)]
+struct TimedMute {
+    mute: Mute,
+    /// From the first commit after it was given, or after a start.
+    left: Option<(Stopwatch, Duration)>,
+}
+
+impl TimedMute {
+    fn new(mute: Mute) -> Self {
+        Self { mute, left: None }
+    }
+
+    fn start(&mut self, host_time: Timestamp) {
+        let left = self.mute.until.duration_since(host_time);
+        self.left
+            .get_or_insert_with(|| (Stopwatch::start(), left.try_into().unwrap_or_default()));
+    }
+
+    fn is_in_force(&self, host_time: Timestamp) -> bool {
+        let has_run_out = |(stopwatch, left): (Stopwatch, Duration)| stopwatch.elapsed() >= left;
+        !self.left.is_some_and(has_run_out) && self.mute.is_in_force(host_time)
+    }
+}
+
 /// Who asked not to be notified, and what waits for that to be over.
 #[derive(Debug, Default)]
 pub(super) struct Mutes {
-    orders: Vec<Mute>,
+    orders: Vec<TimedMute>,
     /// Ends of alerts that people were notified of, which fell into a silence: they are sent after it.
     put_off: Vec<Alert>,
 }
@@ -55,28 +82,37 @@ pub(super) struct Mutes {
 impl Mutes {
     /// As the memory has them.
     pub(super) fn remembered(orders: Vec<Mute>, put_off: Vec<Alert>) -> Self {
+        let orders = orders.into_iter().map(TimedMute::new).collect();
         Self { orders, put_off }
     }
 
     /// For the memory: the orders, and the ends that were put off.
     pub(super) fn to_remember(&self) -> (Vec<Mute>, Vec<Alert>) {
-        (self.orders.clone(), self.put_off.clone())
+        let orders = self.orders.iter().map(|one| one.mute.clone()).collect();
+        (orders, self.put_off.clone())
+    }
+
+    /// Begins to measure the time that those have left which are new.
+    pub(super) fn start(&mut self, host_time: Timestamp) {
+        self.orders.iter_mut().for_each(|one| one.start(host_time));
     }
 
     /// In place of the one of the same kind that there is for the same place: the newest order says how long.
     fn add(&mut self, mute: Mute) {
-        let stays = |one: &Mute| {
+        let stays = |one: &TimedMute| {
+            let one = &one.mute;
             one.benchmark != mute.benchmark || one.up_to.is_some() != mute.up_to.is_some()
         };
         self.orders.retain(stays);
-        self.orders.push(mute);
+        self.orders.push(TimedMute::new(mute));
         let excess = self.orders.len().saturating_sub(MOST);
         self.orders.drain(..excess);
     }
 
     /// Ends those of a benchmark, or all of them.
     fn end(&mut self, benchmark: Option<&BenchmarkId>) {
-        let stays = |mute: &Mute| benchmark.is_some() && mute.benchmark.as_ref() != benchmark;
+        let stays =
+            |one: &TimedMute| benchmark.is_some() && one.mute.benchmark.as_ref() != benchmark;
         self.orders.retain(stays);
     }
 
@@ -98,7 +134,7 @@ impl Mutes {
     /// Whether nobody is to be notified of this alert while the host's clock says `host_time`.
     pub(super) fn are_of(&self, alert: &Alert, host_time: Timestamp) -> bool {
         let place = (alert.event.benchmark.as_ref(), alert.level);
-        self.cover(place, |mute| mute.is_in_force(host_time))
+        self.cover(place, |one| one.is_in_force(host_time))
     }
 
     /// Whether somebody asked not to be notified of it, and that may last still: until the next commit says it by the clock.
@@ -110,12 +146,13 @@ impl Mutes {
     fn cover(
         &self,
         (place, level): (Option<&BenchmarkId>, Level),
-        lasts: impl Fn(&Mute) -> bool,
+        lasts: impl Fn(&TimedMute) -> bool,
     ) -> bool {
-        self.orders.iter().any(|mute| {
+        self.orders.iter().any(|one| {
+            let mute = &one.mute;
             let here = mute.benchmark.is_none() || mute.benchmark.as_ref() == place;
             let low = mute.up_to.is_none_or(|up_to| level <= up_to);
-            here && low && lasts(mute)
+            here && low && lasts(one)
         })
     }
 }
@@ -285,8 +322,8 @@ impl Site {
     /// Who is not to be notified of what while the host's clock says `host_time`.
     pub fn mutes(&self, host_time: Timestamp) -> Vec<Mute> {
         let all = self.mutes.orders.iter();
-        all.filter(|mute| mute.is_in_force(host_time))
-            .cloned()
+        all.filter(|one| one.is_in_force(host_time))
+            .map(|one| one.mute.clone())
             .collect()
     }
 
@@ -295,7 +332,7 @@ impl Site {
         if let Some(alerts) = &self.sinks.alerts {
             alerts.mute(&|place, level| {
                 self.mutes
-                    .cover((place, level), |mute| mute.is_in_force(host_time))
+                    .cover((place, level), |one| one.is_in_force(host_time))
             });
         }
     }
