@@ -464,6 +464,36 @@ fn mutual(sources: &[Source]) -> Vec<String> {
         .collect()
 }
 
+/// Folders of one module, and files beside them, of which each names something in the other.
+fn mutual_folders(sources: &[Source]) -> Vec<String> {
+    let modules = Modules::of(sources);
+    let mut named: BTreeSet<(Vec<String>, Vec<String>)> = BTreeSet::new();
+    let of_tests = |source: &&Source| {
+        let last = source.module.last().map(String::as_str);
+        matches!(last, Some("tests" | "fixture"))
+    };
+    for source in sources
+        .iter()
+        .filter(|one| one.module.len() > 1 && !of_tests(one))
+    {
+        let places = paths(&source.text);
+        let places = places
+            .iter()
+            .filter_map(|path| file_of(&source.module, path, &modules));
+        let others = places.filter(|to| to.len() > 1 && to[0] == source.module[0]);
+        named.extend(others.map(|to| (source.module[..2].to_vec(), to[..2].to_vec())));
+    }
+    let both = (named.iter()).filter(|(a, b)| a < b && named.contains(&(b.clone(), a.clone())));
+    both.map(|(a, b)| format!("{} and {}", a.join("/"), b.join("/")))
+        .collect()
+}
+
+#[test]
+fn no_two_folders_of_one_module_import_each_other() {
+    let mutual = mutual_folders(&sources());
+    assert!(mutual.is_empty(), "{mutual:#?}");
+}
+
 #[test]
 fn no_two_files_of_one_module_import_each_other() {
     let mutual = mutual(&sources());

@@ -17,7 +17,9 @@ import time
 import tty
 
 ANSWER_S = 20.0
-LONGEST = 160
+# A letter that needs two places in the letters of a modem, such as a bracket, makes a message of 160 two messages.
+LONGEST = 150
+ESCAPE = b"\x1b"
 
 
 class Refused(Exception):
@@ -85,13 +87,20 @@ def main():
         modem = opened(sys.argv[1])
         command(modem, "AT\r", [b"OK"])
         command(modem, "AT+CMGF=1\r", [b"OK"])
-        for number in sys.argv[2:]:
-            command(modem, f'AT+CMGS="{number}"\r', [b">"])
-            command(modem, f"{text}\x1a", [b"+CMGS:"])
     except (OSError, Refused) as error:
         print(f"sms.py: {sys.argv[1]}: {error}", file=sys.stderr)
         return 1
-    return 0
+    refused = 0
+    for number in sys.argv[2:]:
+        try:
+            command(modem, f'AT+CMGS="{number}"\r', [b">"])
+            command(modem, f"{text}\x1a", [b"+CMGS:"])
+        except (OSError, Refused) as error:
+            # The others are to have it all the same; the modem may still wait for the text.
+            refused += 1
+            print(f"sms.py: {sys.argv[1]}: {number}: {error}", file=sys.stderr)
+            os.write(modem, ESCAPE)
+    return 1 if refused else 0
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-//! How grave an alert is.
+//! How severe an alert is.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// How grave an alert is. A threshold or a rule of the site may call yellow, orange and red too.
+/// How severe an alert is. A threshold or a rule of the site may call yellow, orange and red too.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, JsonSchema, Serialize, Deserialize,
 )]

@@ -79,7 +79,7 @@ pub(super) fn check(file: &Path, output: OutputArgs, looks_at_files: bool) -> an
             } else {
                 let is_fed = preview
                     .as_ref()
-                    .is_none_or(|preview| preview.unfed.is_empty());
+                    .is_none_or(|preview| preview.without_readings.is_empty());
                 let summary = plain(&summary.to_string());
                 writeln!(stdout, "{}{summary}", if is_fed { "" } else { "not " })?;
                 if let Some(preview) = &preview {
@@ -123,14 +123,18 @@ fn look(file: &Path, summary: &mut ConfigSummary) -> Result<Preview, ConfigError
 }
 
 fn all_are_fed(config: &Path, preview: &Preview) -> anyhow::Result<()> {
-    if preview.unfed.is_empty() {
+    if preview.without_readings.is_empty() {
         return Ok(());
     }
-    let what = preview.unfed.iter().map(|unfed| match &unfed.benchmark {
-        Some(benchmark) => format!("benchmark {:?}", benchmark.as_str()),
-        None if unfed.source.is_empty() => "the site".to_owned(),
-        None => format!("source {:?}", unfed.source),
-    });
+    let what =
+        preview
+            .without_readings
+            .iter()
+            .map(|without_readings| match &without_readings.benchmark {
+                Some(benchmark) => format!("benchmark {:?}", benchmark.as_str()),
+                None if without_readings.source.is_empty() => "the site".to_owned(),
+                None => format!("source {:?}", without_readings.source),
+            });
     Err(Unwatched {
         config: config.to_owned(),
         what: what.collect(),

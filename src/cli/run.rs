@@ -10,6 +10,10 @@ use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// How long threads that still wait may take at the end.
+const LAST_THREADS: Duration = Duration::from_secs(1);
 
 /// Watch a site: follow its files, write events to its state folder, run its hooks
 #[derive(Debug, clap::Args)]
@@ -35,12 +39,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     for warning in &config.warnings {
         tracing::warn!(%warning, "doubtful config");
     }
-    asynchronous()?.block_on(async {
+    let runtime = asynchronous()?;
+    let ended = runtime.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
         let (progress, _) = tokio::sync::watch::channel(Progress::default());
         Box::pin(daemon::run(&config, shutdown, &progress, text::line)).await?;
         Ok(())
-    })
+    });
+    // All is closed by now; a name server that does not answer keeps a thread for up to a minute.
+    runtime.shutdown_timeout(LAST_THREADS);
+    ended
 }
 
 /// The runtime that the daemon and a replay need.

@@ -12,7 +12,7 @@ use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::clock;
 use crate::runtime::drilled::DrillRecord;
 use crate::runtime::preview::{Preview, preview};
-use crate::runtime::record::standing::RecordStanding;
+use crate::runtime::recorded::RecordStanding;
 use crate::runtime::reloaded::{ConfigRefusal, sources_without_files};
 use crate::runtime::service_faults::{ServiceFault, faults_in};
 use crate::runtime::standing::{InForce, TakenOrders, closed, every, in_force};

@@ -64,7 +64,7 @@ pub fn check(file: &Path) -> Result<ConfigSummary, ConfigError> {
             .chain(config.hooks.iter().filter_map(missing_program))
             .chain(config.site.token_file.as_deref().and_then(open_token))
             .chain(slow_sampling(&config))
-            .chain(untold(&config))
+            .chain(levels_without_hook(&config))
             .chain(unknown_benchmarks(&config))
             .chain(only_escalated(&config))
             .chain(off_duty(&config))
@@ -222,7 +222,7 @@ fn missing_program(hook: &HookConfig) -> Option<String> {
 }
 
 /// Levels that no hook is notified of: then nobody is.
-fn untold(config: &Config) -> Vec<String> {
+fn levels_without_hook(config: &Config) -> Vec<String> {
     if config.hooks.is_empty() {
         return Vec::new();
     }

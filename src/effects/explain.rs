@@ -18,6 +18,8 @@ use super::term::Scratch;
 use super::upslope;
 use super::verdict::conclude;
 use crate::reading::{Channel, Series, Timestamp};
+use fnv::FnvHasher;
+use std::hash::Hasher as _;
 
 /// Said of a record with which nothing can be tried.
 pub const TOO_FEW: &str = "There are too few readings to distinguish anything from noise.";
@@ -239,19 +241,15 @@ impl Withheld {
 
 /// FNV-1a over every time and value.
 fn hash(series: &Series, channels: &[Channel]) -> String {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut eat = |bits: u64| {
-        for byte in bits.to_le_bytes() {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        }
-    };
+    let mut hasher = FnvHasher::default();
+    let mut update = |bits: u64| hasher.write(&bits.to_le_bytes());
     for reading in &series.readings {
-        eat(reading.time.as_microsecond().cast_unsigned());
-        eat(reading.value.to_bits());
+        update(reading.time.as_microsecond().cast_unsigned());
+        update(reading.value.to_bits());
     }
     for sample in channels.iter().flat_map(|channel| &channel.samples) {
-        eat(sample.time.as_microsecond().cast_unsigned());
-        eat(sample.value.to_bits());
+        update(sample.time.as_microsecond().cast_unsigned());
+        update(sample.value.to_bits());
     }
-    format!("{hash:016x}")
+    format!("{:016x}", hasher.finish())
 }

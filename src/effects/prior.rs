@@ -1,5 +1,6 @@
 //! What is held to be likely of the law's parameters before any reading: weak, so that what the readings do not determine
-//! stays within bounds.
+//! stays within bounds. The posterior of the monitor has one of its own (`fit/under_load/prior`), of the law as seen from the present velocity:
+//! here the parameters are those at the first reading, from which effects act.
 
 use super::problem::Problem;
 use super::term::{Term, law_parameters};

@@ -55,7 +55,7 @@ fn of_velocities(y: &[f64], misfits: &[f64]) -> Vec<f64> {
         return ones;
     }
     let level = unit_median(level.iter().map(|v| v.max(floor)).collect());
-    if unlikelihood(misfits, &level) < unlikelihood(misfits, &ones) {
+    if negative_ln_likelihood(misfits, &level) < negative_ln_likelihood(misfits, &ones) {
         level
     } else {
         ones
@@ -69,18 +69,18 @@ fn of_displacements(t: &[f64], y: &[f64]) -> Vec<f64> {
     if y.len() < FEWEST {
         return ones;
     }
-    let misfits = unbent_misfits(t, y);
+    let misfits = cubic_misfits(t, y);
     let speeds = speeds(t, y);
     let usual = upper_median(speeds.clone());
     if usual <= 0.0 {
         return ones;
     }
-    let mut least = unlikelihood(&misfits, &ones) - 0.5 * LIKELIER;
+    let mut least = negative_ln_likelihood(&misfits, &ones) - 0.5 * LIKELIER;
     let mut chosen = ones;
     for floor in FLOORS {
         let floored = speeds.iter().map(|speed| speed.max(floor * usual));
         let with = unit_median(floored.collect());
-        let size = unlikelihood(&misfits, &with);
+        let size = negative_ln_likelihood(&misfits, &with);
         if size < least {
             (least, chosen) = (size, with);
         }
@@ -89,7 +89,7 @@ fn of_displacements(t: &[f64], y: &[f64]) -> Vec<f64> {
 }
 
 /// -ln likelihood of the misfits, of heavy tails, under these relative sizes.
-fn unlikelihood(misfits: &[f64], weight: &[f64]) -> f64 {
+fn negative_ln_likelihood(misfits: &[f64], weight: &[f64]) -> f64 {
     let scaled: Vec<f64> = misfits.iter().zip(weight).map(|(m, w)| m / w).collect();
     let size = upper_median(scaled.iter().map(|one| one.abs()).collect()).max(1e-300);
     let logs: f64 = weight.iter().map(|w| w.ln()).sum();
@@ -100,7 +100,7 @@ fn unlikelihood(misfits: &[f64], weight: &[f64]) -> f64 {
 }
 
 /// How far each reading stands from the cubic through the two on each side, scaled to one reading's own error.
-fn unbent_misfits(t: &[f64], y: &[f64]) -> Vec<f64> {
+fn cubic_misfits(t: &[f64], y: &[f64]) -> Vec<f64> {
     let inner = t.windows(5).zip(y.windows(5)).map(|(t, y)| {
         let beside = [0, 1, 3, 4];
         let shares = beside.map(|one| {

@@ -232,8 +232,8 @@ fn distinct(found: &[FoundMinimum], flat: f64, exponent: Exponent) -> Vec<Soluti
                 && branch(&one.law) == branch(&solution.law)
                 && (one.law.r > 0.0) == (solution.law.r > 0.0)
         };
-        let worthy = solution.rms < WORTH_MENTION * flat && solution.rms <= WORST * best;
-        let new = worthy && !kept.iter().any(same);
+        let is_reported = solution.rms < WORTH_MENTION * flat && solution.rms <= WORST * best;
+        let new = is_reported && !kept.iter().any(same);
         if first_of_side || (new && kept.len() < MOST_MINIMA && exponent == Exponent::Free) {
             kept.push(*solution);
         }

@@ -1,5 +1,6 @@
 //! The descent of Levenberg (1944) and Marquardt (1963): steps of a problem that is linearised where it stands, shortened by a
 //! damping that goes up after a step that gains nothing and down after one that gains.
+//! Crates for it (levenberg-marquardt) hold one fixed set of residuals in nalgebra's matrices; here noise parameters are profiled out anew at each step.
 
 /// How the damping goes up and down.
 #[derive(Debug, Clone, Copy)]

@@ -1,4 +1,5 @@
 //! Points that fill a cube evenly, the same every time: Halton's sequence, and normal deviates of them.
+//! Thirty lines; the crates for it bring generators of their own.
 
 use statrs::function::erf::erfc_inv;
 use std::f64::consts::SQRT_2;

@@ -105,6 +105,7 @@ impl UnitMLines {
         projected.map_or(f64::INFINITY, |projected| projected.cost)
     }
 
+    /// By Gauss and Newton with halved steps: one unknown, the rest is projected out, so that there is nothing to damp.
     fn descend(&mut self, record: &WeightedRecord, start: UnitMLine) -> UnitMLine {
         let bounds = slope_bounds();
         let mut line = start;

@@ -2,7 +2,7 @@
 //!
 //! One small network gives the chance of a collapse within the span of a scale of [`Scales`] from the motion at that
 //! scale and those around it, in ratios, so that minutes and months are judged alike, and from what others expect
-//! ([`Members`]): the law, and straight lines through inverse velocity. It was taught by simulated slopes that fail and
+//! ([`Members`]): the law, and straight lines through inverse velocity. It was trained on simulated slopes that fail and
 //! stand in many ways (`studies/src/world`); its weights are in [`super::learned`]. That is what is reported as chances. The time that
 //! is reported is put sooner, and levels go by less: what it says counts for them as far as it is not unlikely that the slope accelerates at all ([`super::evidence`]), because
 //! they are asked at every reading; of the rest a small part is left, so that nothing is called impossible.
@@ -59,7 +59,7 @@ const UNEVEN: f64 = 0.4;
 const STEADY: f64 = 0.1;
 const ONE_SCALE: f64 = 3.0;
 /// The power of the odds of the chances within each time where a collapse is sure to come, and ln of their factor. Families of
-/// simulated slopes that taught a network nothing collapse sooner than it says, and less surely when it says (docs/families.md);
+/// simulated slopes on which a network was not trained collapse sooner than it says, and less surely when it says (docs/families.md);
 /// chosen on these, with the measured series in view.
 const SPREAD: f64 = 0.85;
 const SOONER: f64 = 1.2;
@@ -293,7 +293,7 @@ fn goes_on(scales: &Scales, power: usize, accelerating: f64) -> f64 {
 }
 
 /// The chances within the first spans no less than a hazard that grows as time to the power [`TO_COME`] has them, where readings are days
-/// apart: what taught the network ended at least one interval after its last look, and slopes do not wait for the next reading.
+/// apart: the records it was trained on ended at least one interval after the last evaluation, and slopes do not wait for the next reading.
 fn between_far_readings(chances: &mut [(f64, f64)]) {
     let Some((days, chance)) = chances.get(FIRST_SPANS).copied() else {
         return;

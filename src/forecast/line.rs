@@ -14,6 +14,11 @@ pub struct InverseVelocityLine {
     pub falls_by_errors: f64,
 }
 
+/// The line goes through this share of the rates, newest last, and no fewer than [`FEWEST_IN_LINE`].
+const LINE_SHARE: f64 = 0.25;
+const FEWEST_IN_LINE: usize = 8;
+/// An intercept beyond this many lengths of the record is no prediction.
+pub(crate) const FARTHEST_INTERCEPT: f64 = 3.0;
 /// Fewer points than this make no line.
 const FEWEST_POINTS: usize = 4;
 /// The line is not followed below this share of its mean.
@@ -22,6 +27,17 @@ const NEARLY_ZERO: f64 = 0.02;
 const SAME_DAYS: f64 = 0.01;
 
 impl InverseVelocityLine {
+    /// The newest of `rates`, through which the line goes.
+    pub(crate) fn newest(rates: &[Rate]) -> &[Rate] {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a count within the slice"
+        )]
+        let share = (rates.len() as f64 * LINE_SHARE).round() as usize;
+        &rates[rates.len().saturating_sub(share.max(FEWEST_IN_LINE))..]
+    }
+
     /// The line through the rates that move forward and stand clear of their noise; `None` under four.
     pub fn fit(rates: &[Rate]) -> Option<Self> {
         Self::through(&Self::points(rates))

@@ -24,6 +24,7 @@ pub use collapse::{Collapse, Indicators};
 pub use dependence::Dependence;
 pub use law_passages::HORIZON_DAYS;
 pub(crate) use law_passages::measurably_moves;
+pub(crate) use line::FARTHEST_INTERCEPT;
 pub use line::InverseVelocityLine;
 pub use members::Members;
 pub use network::{INPUTS, Network, UNITS};

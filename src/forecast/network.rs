@@ -1,8 +1,9 @@
 //! A network of one hidden layer, whose weights are learnt elsewhere.
+//! Sixty lines of products; a crate for networks would be the largest dependency, and bind the bytes of a replay to its version.
 
 /// Numbers that the network is given of one span.
 pub const INPUTS: usize = 55;
-/// Hidden units: those of eight networks that were taught apart, and whose mean is taken.
+/// Hidden units: those of eight networks that were trained apart, and whose mean is taken.
 const HIDDEN: usize = 8 * UNITS;
 /// Hidden units of one of them.
 pub const UNITS: usize = 32;

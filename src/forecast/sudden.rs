@@ -1,4 +1,4 @@
-//! A slope that since some readings moves many times as fast as ever before. No simulated slope that taught the network did so and went on, but for
+//! A slope that since some readings moves many times as fast as ever before. No simulated slope on which the network was trained did so and went on, but for
 //! jumps, resets and changes of rate that end there; what it says of such a slope is no guide, and falls as the slope is faster. A faster slope is no
 //! less likely to collapse than one that moves alike and slower, so that the same motion slowed down gives a bound. One or two such intervals may be a
 //! jump of the instrument; then the slope moves as it did before, and that gives one.

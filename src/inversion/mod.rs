@@ -25,7 +25,7 @@ use crate::fit::{
     Assumptions, ConstantLoad, Exponent, LawDraws, Observations, PointReadings, Rate, RateOptions,
     Solution, widen_merged,
 };
-use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, outlook};
+use crate::forecast::{FARTHEST_INTERCEPT, HORIZON_DAYS, InverseVelocityLine, outlook};
 use crate::model::{Accuracy, Law, Trajectory};
 use crate::reading::{LengthUnit, Quantity, Series, TimeUnit, Timestamp, Unit, after_days};
 use jiff::SignedDuration;
@@ -59,12 +59,6 @@ impl Default for InversionOptions {
         }
     }
 }
-
-/// The trailing share of the rates through which the line is drawn, and the fewest of them.
-const LINE: (f64, usize) = (0.25, 8);
-
-/// An intercept beyond this many lengths of the record is no prediction.
-const FARTHEST_INTERCEPT: f64 = 3.0;
 
 /// The readings of one inversion, chosen and in the science's units.
 #[derive(Debug, Clone)]
@@ -208,15 +202,7 @@ impl Inversion {
     }
 
     fn inverse_velocity(&self, rates: &[Rate], accelerating: Option<f64>) -> FittedInverseVelocity {
-        let (share, fewest) = LINE;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a share of a count"
-        )]
-        let wanted = ((rates.len() as f64 * share).round() as usize).max(fewest);
-        let newest = &rates[rates.len().saturating_sub(wanted)..];
-        let line = InverseVelocityLine::fit(newest);
+        let line = InverseVelocityLine::fit(InverseVelocityLine::newest(rates));
         let alpha = if accelerating.is_some_and(|probability| probability >= 0.5) {
             growth::exponent(rates)
         } else {

@@ -2,8 +2,8 @@
 //!
 //! Taylor steps of a given order, from knot to knot of the load and no farther than the series reaches:
 //! the error of a step of h is of order h^(order + 1). While the load stands still beside a steady state
-//! that attracts, the closed form of the relaxation takes over. Nothing is kept but the step at hand, so that a
-//! search may call this without allocating. Not in it: the direct response of the contacts to a change
+//! that attracts, the closed form of the relaxation takes over. Nothing is kept but the step at hand: it does not
+//! allocate. Not in it: the direct response of the contacts to a change
 //! of normal stress (Linker and Dieterich, 1992).
 
 use super::accuracy::Accuracy;

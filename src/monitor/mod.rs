@@ -13,6 +13,7 @@ mod event_shown;
 mod fallen;
 #[cfg(test)]
 mod fixture;
+mod found;
 mod given;
 mod history;
 mod in_force;
@@ -47,7 +48,6 @@ pub use event::{
 pub use event_shown::KindShown;
 pub use given::{Given, OrderKind, OrderedBy};
 pub use measured::Measured;
-pub(crate) use motion::recent;
 pub use notice::{CLOCK_FAULT, Notice};
 pub use order::Order;
 pub use parallel::{Task, Workers};

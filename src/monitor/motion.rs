@@ -5,9 +5,6 @@ use crate::fit::{Observation, Observations, Rate, displacement_sigma, velocity_s
 use crate::forecast::FEWEST_READINGS;
 use crate::reading::{Quantity, Timestamp, upper_median};
 
-/// The line goes through this share of the rates, newest last, and no fewer than [`FEWEST_IN_LINE`].
-const LINE_SHARE: f64 = 0.25;
-const FEWEST_IN_LINE: usize = 8;
 /// Rates whose median is the settled velocity.
 const SETTLED: usize = 5;
 /// Readings are looked at no further back than this for how they scatter.
@@ -35,17 +32,6 @@ const HIGHER: f64 = 1.25;
 /// share of the fall at most.
 const FALLEN_ERRORS: f64 = 10.0;
 const BACK: f64 = 0.25;
-
-/// The newest rates, through which the line goes.
-pub(crate) fn recent(rates: &[Rate]) -> &[Rate] {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a count within the slice"
-    )]
-    let share = (rates.len() as f64 * LINE_SHARE).round() as usize;
-    &rates[rates.len().saturating_sub(share.max(FEWEST_IN_LINE))..]
-}
 
 /// Whether all of the latest rates stand clear of their noise on the wrong side of zero.
 pub(super) fn moves_backwards(rates: &[Rate]) -> bool {

@@ -1,4 +1,5 @@
 //! Panels of lines, points, bands and bars as SVG text: the same numbers give the same bytes.
+//! Crates for plots (plotters) place text by the fonts of the machine, so that their bytes differ.
 
 mod axis;
 mod bars;

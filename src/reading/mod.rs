@@ -1,4 +1,4 @@
-//! The vocabulary of the measured world: benchmarks, quantities, units, readings, channels.
+//! What is measured: benchmarks, quantities, units, readings, channels.
 //!
 //! Values keep the unit in which they were measured, so that a recording converted there and back
 //! is the same readings; the science converts to millimetres and days where it takes them.

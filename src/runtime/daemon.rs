@@ -174,7 +174,7 @@ impl Daemon {
                 tokio::task::block_in_place(|| self.judge_queued())?;
             }
             // Last, so that it keeps nothing else waiting.
-            () = std::future::ready(()), if self.site.owes_look_back() => {
+            () = std::future::ready(()), if self.site.has_review_pending() => {
                 tokio::task::block_in_place(|| self.look_back())?;
             }
         }

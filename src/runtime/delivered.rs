@@ -140,22 +140,22 @@ impl Delivered {
         &mut self,
         alert: &Alert,
         hook: &str,
-        fate: DeliveryOutcome,
+        outcome: DeliveryOutcome,
     ) -> Result<(), StoreError> {
         let receipt = delivered_key(alert, hook);
-        match fate {
+        match outcome {
             DeliveryOutcome::Delivered
             | DeliveryOutcome::Acknowledged
             | DeliveryOutcome::Silenced => {
-                self.ended.insert(receipt, fate);
+                self.ended.insert(receipt, outcome);
             }
             DeliveryOutcome::Over => {
-                self.ended.entry(receipt).or_insert(fate);
+                self.ended.entry(receipt).or_insert(outcome);
             }
             DeliveryOutcome::Waiting | DeliveryOutcome::Dead | DeliveryOutcome::Closed => {}
         }
         if self.store.is_some() && self.unwritten.len() < MOST_UNWRITTEN {
-            self.unwritten.push((delivery(alert, hook)?, fate));
+            self.unwritten.push((delivery(alert, hook)?, outcome));
         }
         Ok(())
     }
@@ -169,9 +169,9 @@ impl Delivered {
         &mut self,
         alert: &Alert,
         hook: &str,
-        fate: DeliveryOutcome,
+        outcome: DeliveryOutcome,
     ) -> Result<(), StoreError> {
-        self.record_outcome(alert, hook, fate)?;
+        self.record_outcome(alert, hook, outcome)?;
         self.commit()
     }
 

@@ -1,9 +1,9 @@
 //! Reports to others that the site is watched, for as long as it is: their alarm is that nothing comes.
 
 use super::http;
+use super::log::is_logged;
 use super::serve::Limits;
 use super::shutdown::Shutdown;
-use super::site::is_logged;
 use super::vitals::Vitals;
 use crate::config::Heartbeat;
 use http_body_util::Full;

@@ -1,5 +1,6 @@
 //! One request to an address, over TLS where it says so.
 
+use super::connect::connect;
 use super::tls;
 use http_body_util::Full;
 use hyper::body::Bytes;
@@ -9,7 +10,6 @@ use hyper::{Method, Request, Uri, header};
 use hyper_util::rt::TokioIo;
 use std::path::Path;
 use tokio::io::{AsyncRead, AsyncWrite};
-use tokio::net::TcpStream;
 
 /// Who calls.
 const AGENT: &str = concat!("slipwatch/", env!("CARGO_PKG_VERSION"));
@@ -38,8 +38,7 @@ pub(super) async fn answer(
     let port = address
         .port_u16()
         .unwrap_or(if is_secured { 443 } else { 80 });
-    let stream = TcpStream::connect((host, port)).await;
-    let stream = stream.map_err(|error| error.to_string())?;
+    let stream = connect(host, port).await?;
     if is_secured {
         let secured = tls::secured(stream, host, ca_file).await?;
         exchange(secured, request).await

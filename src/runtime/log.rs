@@ -15,6 +15,8 @@ const WAITING: usize = 4096;
 /// At the end: how long what waits may take to be written.
 const LAST_LINES: Duration = Duration::from_secs(1);
 
+/// So many values of a kind that are set aside are logged one by one; then each time their number has doubled.
+const LOGGED: u64 = 16;
 /// Lines that were not written.
 static LOST: AtomicU64 = AtomicU64::new(0);
 /// The way to the thread that writes.
@@ -52,6 +54,11 @@ pub fn init(format: LogFormat) {
         LogFormat::Text => builder.try_init(),
         LogFormat::Json => builder.json().try_init(),
     };
+}
+
+/// Whether what happens for the `total`-th time is logged.
+pub(super) fn is_logged(total: u64) -> bool {
+    total <= LOGGED || total.is_power_of_two()
 }
 
 /// Lines of the log that could not be written.

@@ -10,9 +10,9 @@ pub(super) use publish::MQTT_OUT;
 pub(super) use session::MOST_UNACKNOWLEDGED;
 
 use super::clock::Stopwatch;
+use super::log::is_logged;
 use super::service_faults::{FaultPlace, ServiceFaultKind, ServiceFaults};
 use super::shutdown::Shutdown;
-use super::site::is_logged;
 use super::tail::{Arrival, Decoder};
 use crate::config::{Benchmark, Broker};
 use session::{BrokerMessage, NoConnection, Session, SessionEvent};

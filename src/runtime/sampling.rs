@@ -45,7 +45,10 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
     let behind = left_behind(preview);
     let waiting = held_back(config, preview);
     let ends = preview.refused_ends.iter().cloned();
-    let absent = preview.unfed.iter().map(|unfed| unfed.text.clone());
+    let absent = preview
+        .without_readings
+        .iter()
+        .map(|without_readings| without_readings.text.clone());
     lines
         .chain(suspicions)
         .chain(exceeded(config, preview))

@@ -318,6 +318,21 @@ pub(super) fn lasts((given_at, until): (Option<Timestamp>, Timestamp), now: Time
     until > now && !is_set_back
 }
 
+/// The level in force at a place, and whether it is unknown beside it, once a level has been entered or left there.
+pub(super) fn after_alert(
+    (in_force, is_unknown): (Level, bool),
+    level: Level,
+    state: AlertState,
+) -> (Level, bool) {
+    match (level, state) {
+        (Level::Unknown, _) => (in_force, state == AlertState::Firing),
+        (_, AlertState::Firing) => (level, is_unknown),
+        // The end of a level that another one has superseded says nothing of that one.
+        (_, AlertState::Resolved) if in_force == level => (Level::Green, is_unknown),
+        (_, AlertState::Resolved) => (in_force, is_unknown),
+    }
+}
+
 /// Whether it is an order that says that somebody has seen an alert.
 pub(super) fn is_acknowledgement(event: &Event) -> bool {
     matches!(

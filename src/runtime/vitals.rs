@@ -2,9 +2,10 @@
 
 use super::clock::Stopwatch;
 use super::drilled::DrillRecord;
-use super::record::standing::RecordStanding;
+use super::mute::Mute;
+use super::recorded::RecordStanding;
 use super::service_faults::{ServiceFault, ServiceFaults};
-use super::site::Mute;
+use super::standing::after_alert;
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind, Unexplained};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -153,21 +154,6 @@ impl VitalsPoint {
 
     fn call(&mut self, level: Level, state: AlertState) {
         (self.level, self.is_unknown) = after_alert((self.level, self.is_unknown), level, state);
-    }
-}
-
-/// The level in force at a place, and whether it is unknown beside it, once a level has been entered or left there.
-pub(super) fn after_alert(
-    (in_force, is_unknown): (Level, bool),
-    level: Level,
-    state: AlertState,
-) -> (Level, bool) {
-    match (level, state) {
-        (Level::Unknown, _) => (in_force, state == AlertState::Firing),
-        (_, AlertState::Firing) => (level, is_unknown),
-        // The end of a level that another one has superseded says nothing of that one.
-        (_, AlertState::Resolved) if in_force == level => (Level::Green, is_unknown),
-        (_, AlertState::Resolved) => (in_force, is_unknown),
     }
 }
 

@@ -42,7 +42,7 @@ use std::time::Duration;
 /// The database in the state folder.
 const FILE: &str = "slipwatch.db";
 /// A reader, or a command from beside, may hold the file for so long.
-const PATIENCE: Duration = Duration::from_secs(10);
+const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// How often, and after what waits, the folder's lock is tried.
 const LOCK_ATTEMPTS: usize = 10;
 const LOCK_WAIT: Duration = Duration::from_millis(50);
@@ -198,7 +198,7 @@ impl Store {
         std::fs::create_dir_all(folder)?;
         let lock = lock(folder)?;
         let mut connection = Connection::open(folder.join(FILE))?;
-        connection.busy_timeout(PATIENCE)?;
+        connection.busy_timeout(BUSY_TIMEOUT)?;
         schema::version(&connection)?;
         sound(&connection)?;
         logs_ahead(&connection)?;
@@ -229,7 +229,7 @@ impl Store {
         // Not read-only: a log that a crash has left behind must be judged first.
         let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
         let connection = Connection::open_with_flags(file, flags)?;
-        connection.busy_timeout(PATIENCE)?;
+        connection.busy_timeout(BUSY_TIMEOUT)?;
         if schema::version(&connection)? < schema::VERSION {
             return Err(StoreError::Unreadable(
                 "an older version's tables; `slipwatch run` brings them up".to_owned(),

@@ -1,22 +1,16 @@
 //! The sum of a row's values: a bit that flips on the disk is seen.
 
 use super::StoreError;
+use fnv::FnvHasher;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Row};
+use std::hash::Hasher as _;
 use std::ops::Range;
 
-/// FNV-1a, 64 bits: its offset and its prime.
-const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
-const PRIME: u64 = 0x0000_0100_0000_01b3;
-
-/// The sum of a row's values.
+/// The sum of a row's values, FNV-1a of 64 bits.
 pub(super) fn sum(values: &[ValueRef<'_>]) -> i64 {
-    let mut hash = OFFSET;
-    let mut feed = |bytes: &[u8]| {
-        for byte in bytes {
-            hash = (hash ^ u64::from(*byte)).wrapping_mul(PRIME);
-        }
-    };
+    let mut hasher = FnvHasher::default();
+    let mut feed = |bytes: &[u8]| hasher.write(bytes);
     for value in values {
         match value {
             ValueRef::Null => feed(&[0]),
@@ -36,7 +30,7 @@ pub(super) fn sum(values: &[ValueRef<'_>]) -> i64 {
             }
         }
     }
-    hash.cast_signed()
+    hasher.finish().cast_signed()
 }
 
 /// Whether the sum, which stands behind the values in these columns, is theirs.

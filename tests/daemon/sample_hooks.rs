@@ -208,7 +208,7 @@ fn modem(refusing: &'static str) -> (PathBuf, File, thread::JoinHandle<Vec<Strin
             }
             let answer = match part.as_str() {
                 sent if sent == refusing => "\r\n+CMS ERROR: 500\r\n",
-                sent if sent.starts_with("AT+CMGS=") => "\r\n> ",
+                sent if sent.trim_start_matches('\u{1b}').starts_with("AT+CMGS=") => "\r\n> ",
                 sent if sent.starts_with("AT") => "\r\nOK\r\n",
                 _ => "\r\n+CMGS: 1\r\n\r\nOK\r\n",
             };
@@ -240,6 +240,19 @@ fn a_text_message_goes_to_each_number_and_a_modem_that_refuses_is_a_failure() {
             text
         ]
     );
+    let (device, held, got) = modem("AT+CMGS=\"+391\"");
+    let output = run(
+        "sms.py",
+        &[device.to_str().unwrap(), "+391", "+392"],
+        RED,
+        &[],
+    );
+    assert_eq!(output.status.code(), Some(1), "the daemon tries again");
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("+391: the modem answers"), "{said}");
+    drop(held);
+    // What is left of a message is ended first.
+    assert_eq!(got.join().unwrap()[3..], ["\x1bAT+CMGS=\"+392\"", text]);
     let (device, held, got) = modem("AT+CMGF=1");
     let output = run("sms.py", &[device.to_str().unwrap(), "+391"], RED, &[]);
     assert_eq!(output.status.code(), Some(1));

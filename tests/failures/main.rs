@@ -18,7 +18,7 @@
 //! | 16 | a sync fails: at the start, of a commit, of the database | `disk` |
 //! | 17 | a database that is damaged, newer, foreign, in use | `database` |
 //! | 18 | hooks | tests/daemon/hooks.rs, tests/daemon/sandbox.rs |
-//! | 19 | all benchmarks at once | `crowd`; flapping: src/alert/latch.rs |
+//! | 19 | all benchmarks at once | `many_alerts`; flapping: src/alert/latch.rs |
 //! | 20 | clocks that step, a machine that sleeps | `machine`, `orders`; the watchdog is in tests/daemon/service.rs |
 //! | 21 | a config that is wrong, a benchmark that is taken out | `orders` |
 //! | 22 | recordings | tests/daemon/follow.rs, tests/library/ingest_mcap.rs, tests/library/mutated_files.rs |
@@ -55,7 +55,6 @@
     reason = "a test fails by panicking, and its rows are few and small"
 )]
 
-mod crowd;
 mod database;
 mod disk;
 mod drill;
@@ -68,6 +67,7 @@ mod killed;
 mod link;
 mod log;
 mod machine;
+mod many_alerts;
 mod model;
 mod orders;
 mod past;

@@ -143,7 +143,7 @@ impl<'a> Host<'a> {
         let measured = sent.iter().map(|(_, measured)| *measured).collect();
         running.listen(sent.into_iter().map(|(delivery, _)| delivery));
         running.daemon.tick().unwrap();
-        while running.daemon.site.owes_look_back() {
+        while running.daemon.site.has_review_pending() {
             running.daemon.look_back().unwrap();
         }
         measured

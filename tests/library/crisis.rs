@@ -118,7 +118,7 @@ impl Crisis {
         self.events.iter().filter_map(alert).collect()
     }
 
-    /// When a level at least this grave was first entered.
+    /// When a level at least this severe was first entered.
     pub(crate) fn first(&self, level: Level) -> Option<Timestamp> {
         let entered = |(_, l, state): &(Timestamp, Level, AlertState)| {
             *l >= level && *l != Level::Unknown && *state == AlertState::Firing

@@ -103,7 +103,7 @@ fn day_of(time: Timestamp) -> i64 {
 }
 
 /// The levels from `first` on, but for yellow.
-fn grave(events: &[Event], first: i64) -> Vec<(i64, Level, AlertState)> {
+fn severe(events: &[Event], first: i64) -> Vec<(i64, Level, AlertState)> {
     levels(events)
         .into_iter()
         .map(|(time, level, state)| (day_of(time), level, state))
@@ -154,7 +154,7 @@ fn a_wet_spring_raises_no_orange_and_a_smaller_chance_where_its_effect_is_adopte
     let wet = wet_spring();
     let finding = (250, found(STANDS));
     let adopted = play(&mut monitor(Explain::Adopt), &wet, Some(&finding));
-    assert_eq!(grave(&adopted, 250), []);
+    assert_eq!(severe(&adopted, 250), []);
     let reported = play(&mut monitor(Explain::Report), &wet, Some(&finding));
     let highest = |events: &[Event]| {
         let later = chances(events).into_iter().filter(|(day, ..)| *day > 250);
@@ -178,17 +178,17 @@ fn a_failure_that_a_falling_reservoir_pauses_stays_orange_and_turns_red_in_time(
     let fails = day_of(paused.fails.unwrap());
     let finding = (180, found(failing));
     let events = play(&mut monitor(Explain::Adopt), &paused, Some(&finding));
-    let grave = grave(&events, 180);
-    let red = grave
+    let severe = severe(&events, 180);
+    let red = severe
         .iter()
         .find(|(_, level, _)| *level == Level::Red)
         .unwrap();
     assert!(
         (3..=30).contains(&(fails - red.0)),
-        "{grave:?}, fails {fails}"
+        "{severe:?}, fails {fails}"
     );
     let falls = |one: &&(i64, Level, AlertState)| one.0 > 220 && one.2 == AlertState::Resolved;
-    assert_eq!(grave.iter().find(falls), None);
+    assert_eq!(severe.iter().find(falls), None);
     // While it pauses, the plain law sees a slope that comes to rest.
     let at_rest = |events: &[Event]| {
         let paused = chances(events).into_iter();
@@ -220,7 +220,7 @@ fn an_effect_that_rises_along_with_a_failure_by_chance_does_not_hide_it() {
         &measured,
         Some(&(150, found(wrong))),
     );
-    let levels = grave(&events, 150);
+    let levels = severe(&events, 150);
     let red = levels.iter().find(|(_, level, _)| *level == Level::Red);
     let red = red.unwrap_or_else(|| panic!("never red: {levels:?}"));
     assert!(fails - red.0 >= 3, "{levels:?}, fails {fails}");

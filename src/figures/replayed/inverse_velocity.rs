@@ -7,7 +7,7 @@ use crate::figures::day;
 use crate::figures::in_time::{dots, line, thinned};
 use crate::fit::Rate;
 use crate::forecast::InverseVelocityLine;
-use crate::monitor::{FailureTime, recent};
+use crate::monitor::FailureTime;
 use crate::plot::{Axis, BLACK, BLUE, GREY, Legend, Mark, PURPLE, Panel, Stack};
 use crate::reading::{Quantity, Timestamp};
 
@@ -258,7 +258,7 @@ fn uprights(dated: &[Dated]) -> Vec<(String, Mark)> {
 /// give the line that the monitor reported.
 fn straight(rates: &[Rate], refit: &ReplayedRefit) -> Option<Vec<(f64, f64)>> {
     let zero = day(refit.intercept?);
-    InverseVelocityLine::segment(recent(rates), zero).map(Vec::from)
+    InverseVelocityLine::segment(InverseVelocityLine::newest(rates), zero).map(Vec::from)
 }
 
 /// The top of the axis: above the points of the record's last part, as the slow ones before would press them flat.

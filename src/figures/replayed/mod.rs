@@ -348,7 +348,7 @@ mod tests {
             svg.matches("line through the newest").count()
         };
         let mut rates = replayed(&series, &[]).rates(at(30));
-        rates = crate::monitor::recent(&rates).to_vec();
+        rates = crate::forecast::InverseVelocityLine::newest(&rates).to_vec();
         let zero = crate::forecast::InverseVelocityLine::fit(&rates).unwrap();
         let zero = after_days(Timestamp::UNIX_EPOCH, zero.intercept_days.unwrap()).unwrap();
         assert!((day(zero) - 50.0).abs() < 0.5);

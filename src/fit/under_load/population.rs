@@ -34,7 +34,7 @@ const STEP: f64 = 0.636;
 const WHOLE: usize = 8;
 /// How much the size of a step varies, and what is added to it, in standard deviations of the population.
 const VARIED: f64 = 0.2;
-const SHAKEN: f64 = 1e-3;
+const JITTER: f64 = 1e-3;
 /// The seed: the same readings give the same laws.
 const SEED: u64 = 2004;
 
@@ -249,7 +249,7 @@ impl Population {
     pub(super) fn round(&mut self) {
         self.rounds += 1;
         let count = self.members.len();
-        let shaken = self.spread() * SHAKEN;
+        let jitter_sd = self.spread() * JITTER;
         let step = if self.rounds.is_multiple_of(WHOLE) {
             1.0
         } else {
@@ -261,15 +261,15 @@ impl Population {
             let two = other(self.generator.random_range(1..count.max(2)));
             let size: f64 = self.generator.sample(StandardNormal);
             let along = self.members[one].at - self.members[two].at;
-            let shake = Point::from_fn(|_, _| self.generator.sample::<f64, _>(StandardNormal));
+            let jitter = Point::from_fn(|_, _| self.generator.sample::<f64, _>(StandardNormal));
             let size = if step < 1.0 {
                 step * (VARIED * size).exp()
             } else {
                 step
             };
-            let at = self.members[index].at + along * size + shake.component_mul(&shaken);
-            let luck = self.generator.random::<f64>().max(1e-300).ln();
-            let least = self.members[index].ln + luck;
+            let at = self.members[index].at + along * size + jitter.component_mul(&jitter_sd);
+            let ln_uniform = self.generator.random::<f64>().max(1e-300).ln();
+            let least = self.members[index].ln + ln_uniform;
             let ln = self.scales.ln_posterior(&at, least);
             if ln >= least {
                 self.members[index] = Member { at, ln };

@@ -286,7 +286,7 @@ impl Track {
             let record = &self.record;
             if let Some(event) = self.forecaster.watch(record, time, forecast, context) {
                 let cause = AlertCause::UnexplainedResidual;
-                self.alarm.attend(policy, time, cause);
+                self.alarm.note_cause(policy, time, cause);
                 events.push(event);
             }
         }
@@ -297,7 +297,7 @@ impl Track {
     fn refit(&mut self, policy: &Policy, time: Timestamp, forecast: &Forecast) -> Vec<Event> {
         let (events, causes) = self.changes.refit(&self.record, policy, time, forecast);
         for cause in causes {
-            self.alarm.attend(policy, time, cause);
+            self.alarm.note_cause(policy, time, cause);
         }
         events
     }

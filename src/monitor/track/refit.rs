@@ -3,20 +3,17 @@
 use super::forecast::{EARLY, Forecast};
 use super::record::BenchmarkRecord;
 use crate::alert::{AlertCause, Policy};
-use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Passage};
+use crate::forecast::{FARTHEST_INTERCEPT, HORIZON_DAYS, InverseVelocityLine, Outlook, Passage};
 use crate::monitor::drift::{self, Drift};
 use crate::monitor::event::{
     ChancesOfCollapse, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport,
     Unexplained,
 };
 use crate::monitor::motion::settled;
-use crate::monitor::recent;
 use crate::reading::{Timestamp, after_days, days_of};
 use crate::regime::{Regime, Tracker, label};
 use serde::Serialize;
 
-/// An intercept beyond this many lengths of the record is no prediction.
-const FARTHEST_INTERCEPT: f64 = 3.0;
 /// A line calls for attention when it falls by so many standard errors of its slope.
 const CLEARLY: f64 = 4.0;
 
@@ -80,9 +77,9 @@ impl FitChanges {
         let least = (predicted.length / 40.0).max(0.02);
         let mut events = Vec::new();
         if let Some(moved) = self.intercept.update(now, predicted.intercept, least) {
-            let expected = outlook
-                .law
-                .and_then(|law| drift::expected_by_the_law(&law, recent(&outlook.rates), now));
+            let expected = outlook.law.and_then(|law| {
+                drift::expected_by_the_law(&law, InverseVelocityLine::newest(&outlook.rates), now)
+            });
             // A slope that moves backwards has no inverse velocity that meets zero.
             let is_forward = settled(&outlook.rates).is_none_or(|velocity| velocity >= 0.0);
             // Noise about a steady velocity gives a line, now and then, that meets zero.
@@ -136,7 +133,7 @@ impl FitChanges {
 impl PredictedTimes {
     fn of(outlook: &Outlook) -> Self {
         let now = outlook.now_days;
-        let line = InverseVelocityLine::fit(recent(&outlook.rates));
+        let line = InverseVelocityLine::fit(InverseVelocityLine::newest(&outlook.rates));
         let length = now - outlook.rates.first().map_or(now, |rate| rate.from);
         let intercept = line
             .and_then(|line| line.intercept_days)

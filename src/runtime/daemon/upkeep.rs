@@ -71,8 +71,8 @@ impl Daemon {
     /// Where orange or red is in force.
     fn levels_in_memory(&self) -> String {
         let points = self.reporting.vitals.points();
-        let grave = points.iter().filter(|(_, one)| one.level >= Level::Orange);
-        let named: Vec<String> = (grave.take(MOST_NAMED))
+        let severe = points.iter().filter(|(_, one)| one.level >= Level::Orange);
+        let named: Vec<String> = (severe.take(MOST_NAMED))
             .map(|(id, one)| format!("{id} {}", one.level.name()))
             .collect();
         if named.is_empty() {

@@ -307,7 +307,7 @@ impl Dispatcher {
 
     /// Notes that a hook is not to be tried, or tried again, with an alert that it has not taken: durable from the next
     /// [`Dispatcher::commit`] on.
-    fn call_off(&self, way: &HookQueue, alert: &Alert, fate: DeliveryOutcome) {
+    fn call_off(&self, way: &HookQueue, alert: &Alert, outcome: DeliveryOutcome) {
         let name = way.hook.name();
         let mut queued = locked(&way.queued);
         let mut delivered = locked(&self.delivered);
@@ -316,8 +316,8 @@ impl Dispatcher {
         }
         queued.end(alert);
         let key = &alert.key;
-        tracing::info!(hook = name, key, ?fate, "not sent, or not tried again");
-        if let Err(error) = delivered.record_outcome(alert, &name, fate) {
+        tracing::info!(hook = name, key, ?outcome, "not sent, or not tried again");
+        if let Err(error) = delivered.record_outcome(alert, &name, outcome) {
             tracing::warn!(hook = name, key, %error, "no receipt: a restart may send it");
         }
     }

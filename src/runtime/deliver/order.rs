@@ -4,7 +4,7 @@ use crate::alert::Level;
 use crate::reading::BenchmarkId;
 use crate::runtime::hook::{Alert, MessageState};
 
-/// How grave it is: of two that are due the higher goes first.
+/// How severe it is: of two that are due the higher goes first.
 pub(super) fn severity(alert: &Alert) -> u8 {
     match (alert.level, alert.state) {
         (Level::Red, MessageState::Firing) => 5,

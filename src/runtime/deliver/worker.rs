@@ -305,7 +305,7 @@ impl Worker {
             self.wait(again, clock::later(delay));
         } else {
             self.lost += 1;
-            let fate = if open {
+            let outcome = if open {
                 tracing::error!(hook, key, attempt, ?outcome, "alert not delivered");
                 DeliveryOutcome::Dead
             } else {
@@ -313,7 +313,7 @@ impl Worker {
                 tracing::warn!(hook, key, attempt, ?outcome, "{text}");
                 DeliveryOutcome::Waiting
             };
-            self.finish(&waiting.alert, fate);
+            self.finish(&waiting.alert, outcome);
         }
     }
 
@@ -337,14 +337,14 @@ impl Worker {
     }
 
     /// Notes what became of an alert, then lets go of it.
-    fn finish(&self, alert: &Alert, fate: DeliveryOutcome) {
-        self.note(alert, fate);
+    fn finish(&self, alert: &Alert, outcome: DeliveryOutcome) {
+        self.note(alert, outcome);
         locked(&self.queued).release(alert);
     }
 
-    fn note(&self, alert: &Alert, fate: DeliveryOutcome) {
+    fn note(&self, alert: &Alert, outcome: DeliveryOutcome) {
         let hook = self.hook.name();
-        if let Err(error) = locked(&self.delivered).note(alert, &hook, fate) {
+        if let Err(error) = locked(&self.delivered).note(alert, &hook, outcome) {
             let key = &alert.key;
             tracing::warn!(hook, key, %error, "no receipt: a restart may send it again");
         }

@@ -2,7 +2,7 @@
 //!
 //! In MQTT 5 a broker says where it does not let us publish; one that knows 3.1.1 only acknowledges that too, and drops the message.
 
-use super::session::{NoConnection, may_be_another_version, transport};
+use super::session::{NoConnection, host_of, may_be_another_version, transport};
 use crate::config::MqttTopic;
 use crate::runtime::hook::HookOutcome;
 use crate::runtime::way_out::{DeliveryAttempt, WayOut, destination};
@@ -82,7 +82,8 @@ impl<E: Into<NoConnection>> From<E> for PublishRefusal {
 
 async fn by_five(to: &MqttTopic, body: Vec<u8>) -> Result<(), PublishRefusal> {
     let address = &to.address;
-    let mut options = v5::MqttOptions::new(client_id(), &address.host, address.port);
+    let host = host_of(address).await?;
+    let mut options = v5::MqttOptions::new(client_id(), host, address.port);
     options
         .set_clean_start(true)
         .set_max_packet_size(Some(LONGEST_PACKET))
@@ -116,7 +117,8 @@ async fn by_five(to: &MqttTopic, body: Vec<u8>) -> Result<(), PublishRefusal> {
 
 async fn by_three(to: &MqttTopic, body: Vec<u8>) -> Result<(), NoConnection> {
     let address = &to.address;
-    let mut options = v3::MqttOptions::new(client_id(), &address.host, address.port);
+    let host = host_of(address).await?;
+    let mut options = v3::MqttOptions::new(client_id(), host, address.port);
     options
         .set_clean_session(true)
         .set_max_packet_size(LONGEST_PACKET as usize, LONGEST_PACKET as usize)

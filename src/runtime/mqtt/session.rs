@@ -4,7 +4,7 @@
 //! 20 are usual: each twenty messages then wait for a commit.
 
 use crate::config::{Broker, BrokerAddress};
-use crate::runtime::tls;
+use crate::runtime::{connect, tls};
 use rumqttc::v5::mqttbytes::QoS as QoS5;
 use rumqttc::v5::mqttbytes::v5 as packet5;
 use rumqttc::v5::{self, mqttbytes::v5::ConnectReturnCode};
@@ -25,6 +25,8 @@ const LONGEST_PACKET: u32 = 268_435_455 + 5;
 const LONGEST_SENT: usize = 1 << 20;
 /// Requests that may wait for the connection.
 const REQUESTS: usize = 64;
+/// By when an address of a broker must answer.
+const CONNECT: Duration = Duration::from_secs(5);
 /// How often we ping the broker.
 const KEEP_ALIVE: Duration = Duration::from_secs(30);
 
@@ -142,7 +144,7 @@ impl Session {
     pub(super) async fn next(&mut self) -> Result<SessionEvent, NoConnection> {
         let link = match &mut self.link {
             Some(link) => link,
-            none => none.insert(open(self.version, &self.broker, &self.client_id)?),
+            none => none.insert(open(self.version, &self.broker, &self.client_id).await?),
         };
         let came = match link {
             Link::Five(client, connection) => match connection.poll().await {
@@ -184,9 +186,8 @@ impl Session {
                         Version::Three => Version::Five,
                     };
                 }
-                if is_other || self.broker.address.is_secured {
-                    self.link = None;
-                }
+                // Opened anew: its name may lead elsewhere by now, and its certificates may be others.
+                self.link = None;
                 Err(error)
             }
         }
@@ -214,11 +215,28 @@ impl Session {
 }
 
 /// Ready to connect.
-fn open(version: Version, broker: &Broker, client_id: &str) -> Result<Link, NoConnection> {
+async fn open(version: Version, broker: &Broker, client_id: &str) -> Result<Link, NoConnection> {
     let transport = transport(&broker.address, broker.ca_file.as_deref())?;
+    let to = (host_of(&broker.address).await?, broker.address.port);
     Ok(match version {
-        Version::Five => five(broker, client_id, transport),
-        Version::Three => three(broker, client_id, transport),
+        Version::Five => five(broker, to, client_id, transport),
+        Version::Three => three(broker, to, client_id, transport),
+    })
+}
+
+/// To which host to connect: the address of it that answers; over TLS its name, with which its certificate is compared.
+pub(super) async fn host_of(address: &BrokerAddress) -> Result<String, String> {
+    if address.is_secured {
+        return Ok(address.host.clone());
+    }
+    let answering = connect::answering(&address.host, address.port);
+    let answering = tokio::time::timeout(CONNECT, answering).await;
+    answering.unwrap_or_else(|_| {
+        Err(format!(
+            "{}: no answer within {} s",
+            address.host,
+            CONNECT.as_secs()
+        ))
     })
 }
 
@@ -234,9 +252,9 @@ pub(super) fn transport(
     Ok(Transport::tls_with_config(TlsConfiguration::Rustls(config)))
 }
 
-fn five(broker: &Broker, client_id: &str, transport: Transport) -> Link {
+fn five(broker: &Broker, to: (String, u16), client_id: &str, transport: Transport) -> Link {
     let address = &broker.address;
-    let mut options = v5::MqttOptions::new(client_id, &address.host, address.port);
+    let mut options = v5::MqttOptions::new(client_id, to.0, to.1);
     options
         .set_clean_start(false)
         .set_session_expiry_interval(Some(u32::MAX))
@@ -252,9 +270,9 @@ fn five(broker: &Broker, client_id: &str, transport: Transport) -> Link {
     Link::Five(client, Box::new(connection))
 }
 
-fn three(broker: &Broker, client_id: &str, transport: Transport) -> Link {
+fn three(broker: &Broker, to: (String, u16), client_id: &str, transport: Transport) -> Link {
     let address = &broker.address;
-    let mut options = v3::MqttOptions::new(client_id, &address.host, address.port);
+    let mut options = v3::MqttOptions::new(client_id, to.0, to.1);
     options
         .set_clean_session(false)
         .set_manual_acks(true)

@@ -8,12 +8,13 @@ mod refused;
 mod resets;
 mod stated;
 mod track;
-mod unfed;
 mod view;
+mod without_readings;
 
 pub use refused::{RefusedKinds, RefusedRow};
 pub use view::{
-    BenchmarkPreview, ColumnView, CovariateView, LayoutView, Preview, Refusal, SourceView, Unfed,
+    BenchmarkPreview, BenchmarkWithoutReadings, ColumnView, CovariateView, LayoutView, Preview,
+    Refusal, SourceView,
 };
 
 use super::clock;
@@ -60,7 +61,7 @@ pub fn preview(config: &Config) -> Preview {
         look.source(source, &Decoder::new(source, &config.benchmarks));
     }
     let mut preview = look.finish(config);
-    preview.unfed = unfed::unfed(&preview, config);
+    preview.without_readings = without_readings::without_readings(&preview, config);
     preview.absent = stated::absent(&preview, config);
     preview
 }
@@ -434,7 +435,7 @@ impl PreviewSoFar {
                 .map(PreviewCovariate::finish)
                 .collect(),
             refused_ends: self.ends.lines(),
-            unfed: Vec::new(),
+            without_readings: Vec::new(),
             absent: Vec::new(),
         }
     }

@@ -3,7 +3,7 @@
 use crate::alert::Level;
 use crate::monitor::{Event, EventKind};
 use crate::reading::{BenchmarkId, Timestamp};
-use crate::runtime::vitals::after_alert;
+use crate::runtime::standing::after_alert;
 use std::collections::BTreeMap;
 
 /// `None`: the site.

@@ -6,12 +6,12 @@
 
 use super::files;
 use super::level_now::LevelsNow;
-use super::standing::RecordStanding;
 use super::topics::TopicWriter;
 use crate::config::{Config, RecordFiles};
 use crate::monitor::{Event, Measured, by_time};
 use crate::reading::Timestamp;
 use crate::runtime::clock::{self, Stopwatch};
+use crate::runtime::recorded::RecordStanding;
 use crate::runtime::standing::every_until;
 use crate::runtime::vitals::Vitals;
 use crate::store::{Store, StoreError};

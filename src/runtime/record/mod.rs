@@ -8,7 +8,6 @@ mod level_now;
 pub mod live;
 mod messages;
 mod schemas;
-pub mod standing;
 mod topics;
 
 use super::ingest::{IngestError, write_mcap_by};

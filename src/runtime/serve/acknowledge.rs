@@ -1,6 +1,7 @@
 //! The page behind the link in an alert's message: it shows the alert, and its button acknowledges it. Plain HTML, no script.
 
 use super::caller::{NO_SUCH_PAGE, OwnNames};
+use super::threads::ORDERS;
 use crate::reading::Timestamp;
 use crate::runtime::link::AskedLink;
 use crate::runtime::view::{AlertLife, AlertView, LinkPage, LinkTarget, SiteReader};
@@ -77,7 +78,7 @@ async fn answer(reader: Arc<SiteReader>, asked: LinkQuery, by: Option<String>) -
         };
         by.map_or_else(|| reader.link(&asked), |by| reader.acknowledge(&asked, &by))
     };
-    let found = tokio::task::spawn_blocking(work).await;
+    let found = ORDERS.run(work).await;
     let found = found.unwrap_or_else(|error| Err(StoreError::Unreadable(error.to_string())));
     let (status, title, body) = match found {
         Ok(page) => page_of(&page, &zone),

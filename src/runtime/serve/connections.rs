@@ -16,7 +16,7 @@ const LONGEST_HEAD: usize = 16 * 1024;
 /// Most headers of a request.
 const MOST_HEADERS: usize = 64;
 /// After a connection could not be taken, as when there are no more file descriptors.
-const BREATH: Duration = Duration::from_millis(200);
+const RETRY_AFTER: Duration = Duration::from_millis(200);
 
 /// Serves until `stopped`; open connections are then dropped. Where there are as many as may be, one more takes the
 /// place of the oldest: whoever opens many and asks nothing keeps nobody else waiting.
@@ -48,7 +48,7 @@ pub(super) async fn serve(
             }
             Err(error) => {
                 tracing::warn!(%error, "a connection could not be taken");
-                tokio::time::sleep(BREATH).await;
+                tokio::time::sleep(RETRY_AFTER).await;
             }
         }
     }

@@ -6,6 +6,7 @@ mod connections;
 mod metrics;
 mod page;
 mod routes;
+mod threads;
 mod views;
 
 pub use metrics::CONTENT_TYPE;

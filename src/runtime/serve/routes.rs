@@ -1,6 +1,7 @@
 //! What is answered to which request, and to whom.
 
 use super::caller::{NO_SUCH_PAGE, OwnNames, SharedToken, is_this_machine};
+use super::threads::READING;
 use super::{ListenOptions, ServedState, acknowledge, metrics, page, views};
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use axum::extract::{DefaultBodyLimit, Query, Request, State};
@@ -233,7 +234,8 @@ async fn events(
     Query(range): Query<EventRange>,
 ) -> Result<Response, ArchiveError> {
     let limit = range.limit.unwrap_or(MOST_EVENTS).min(MOST_EVENTS);
-    let page = tokio::task::spawn_blocking(move || archive.events(range.since.as_deref(), limit))
+    let page = READING
+        .run(move || archive.events(range.since.as_deref(), limit))
         .await
         .map_err(|error| ArchiveError::Unreadable(error.to_string()))??;
     let mut response = page.lines.into_response();

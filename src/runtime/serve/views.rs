@@ -1,5 +1,6 @@
 //! What the page asks: the site, a benchmark, changes as they come, and orders to be given.
 
+use super::threads::{ORDERS, READING, Threads};
 use crate::monitor::Order;
 use crate::reading::Timestamp;
 use crate::runtime::view::{
@@ -74,11 +75,12 @@ impl IntoResponse for Failure {
     }
 }
 
-/// The state is asked on a thread that may wait.
+/// As [`Threads::run`], for what is asked of the state.
 async fn blocking<T: Send + 'static>(
+    threads: &'static Threads,
     work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
 ) -> Result<T, Failure> {
-    let done = tokio::task::spawn_blocking(work).await;
+    let done = threads.run(work).await;
     done.unwrap_or_else(|error| Err(Failure::Broken(error.to_string())))
 }
 
@@ -112,7 +114,7 @@ async fn site(
     State(reader): State<Arc<SiteReader>>,
     Query(moment): Query<SiteMoment>,
 ) -> Result<Json<SiteView>, Failure> {
-    blocking(move || Ok(reader.site(moment.at)?))
+    blocking(&READING, move || Ok(reader.site(moment.at)?))
         .await
         .map(Json)
 }
@@ -141,7 +143,7 @@ async fn benchmark(
         to: asked.to,
         buckets: asked.buckets,
     };
-    let found = blocking(move || {
+    let found = blocking(&READING, move || {
         let view = reader.benchmark(&asked.id, window)?;
         view.ok_or_else(|| Failure::NoSuch(format!("benchmark {:?}", asked.id)))
     });
@@ -158,7 +160,7 @@ async fn alert(
     State(reader): State<Arc<SiteReader>>,
     Query(asked): Query<OfAlert>,
 ) -> Result<Json<AlertView>, Failure> {
-    let found = blocking(move || {
+    let found = blocking(&READING, move || {
         let view = reader.alert(&asked.key)?;
         view.ok_or_else(|| Failure::NoSuch(format!("alert {:?}", asked.key)))
     });
@@ -169,7 +171,7 @@ async fn ask(
     State(reader): State<Arc<SiteReader>>,
     Json(asked): Json<Asked>,
 ) -> Result<Json<Order>, Failure> {
-    let taken = blocking(move || reader.ask(&asked).map_err(Failure::Order));
+    let taken = blocking(&ORDERS, move || reader.ask(&asked).map_err(Failure::Order));
     taken.await.map(Json)
 }
 
@@ -196,7 +198,7 @@ async fn changes(State(reader): State<Arc<SiteReader>>, Query(since): Query<Sinc
             tokio::time::sleep(POLL_INTERVAL).await;
         }
         place.looks += 1;
-        let (place, text) = blocking(move || {
+        let (place, text) = blocking(&READING, move || {
             let text = place.look()?;
             Ok((place, text))
         })

@@ -4,6 +4,7 @@ use super::{BEFORE_ALL, MOST_UNWRITTEN, Site};
 use crate::monitor::{Event, Input, Notice};
 use crate::reading::{BenchmarkId, Timestamp, suspicion};
 use crate::runtime::clock::{self, Stopwatch};
+use crate::runtime::log::is_logged;
 use crate::runtime::tail::Arrival;
 use crate::runtime::workers::AllCores;
 use crate::store::{Presence, StoreError};
@@ -23,8 +24,6 @@ const LONGEST_BATCH: Duration = Duration::from_secs(60);
 /// Calls of [`Site::judge_current`] before the first start counts as caught up; what is left is judged when nothing
 /// else waits.
 const MOST_JUDGED: usize = 8;
-/// So many values of a kind that are set aside are logged one by one; then each time their number has doubled.
-const LOGGED: u64 = 16;
 
 /// Why a daemon does not take a value, by its time alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -67,11 +66,6 @@ fn clock_leapt(now: Timestamp, host_time: Timestamp) -> String {
         "the host's clock says {host_time}, and by the newest readings and the time that ran since it is {now}: the host was suspended, \
          or its clock is wrong and has to be set. Until a reading agrees with it, silences are counted in the time that ran"
     )
-}
-
-/// Whether the value that is set aside as number `total` is logged.
-pub(in crate::runtime) fn is_logged(total: u64) -> bool {
-    total <= LOGGED || total.is_power_of_two()
 }
 
 impl Site {
@@ -394,8 +388,8 @@ impl Site {
     pub fn live(&mut self, host_time: Timestamp) -> Vec<Event> {
         let now = self.keeper.now(host_time);
         let mut events = self.pass_by(now, self.clock(host_time));
-        if let Some(lull) = self.keeper.in_doubt(host_time) {
-            events.extend(self.judge_by(host_time, lull));
+        if let Some(pause) = self.keeper.in_doubt(host_time) {
+            events.extend(self.judge_by(host_time, pause));
         }
         events.extend(self.end_silences(now));
         let (is_behind, has_leapt) = (
@@ -466,7 +460,7 @@ impl Site {
     }
 
     /// Whether something is still to be looked back on: what came late, or the past before a first start.
-    pub fn owes_look_back(&self) -> bool {
+    pub fn has_review_pending(&self) -> bool {
         let is_late = self.monitor.late().is_some() && self.batch_goes_on.is_none();
         is_late || self.owes_past()
     }

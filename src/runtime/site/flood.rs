@@ -8,8 +8,9 @@ use crate::monitor::{AlertState, Event, EventKind};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::hook::{Alert, FLOOD, MessageState, state_name};
 use crate::runtime::many::{FloodMember, ManyAlerts};
+use fnv::FnvHasher;
 use std::collections::{BTreeMap, BTreeSet};
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{Hash, Hasher as _};
 
 /// Alerts of one level and state that go out singly in one commit.
 const MOST_AT_ONCE: usize = 10;
@@ -77,7 +78,7 @@ fn together(others: &[&Alert], audience: &BTreeSet<BenchmarkId>) -> Option<Alert
     let (count, level) = (others.len(), first.level);
     let (named, rest) = names(&many.members);
     // Hooks that ask for different benchmarks may have the same first one, not the same members.
-    let mut hasher = DefaultHasher::new();
+    let mut hasher = FnvHasher::default();
     (others.iter().map(|alert| &alert.key)).for_each(|key| key.hash(&mut hasher));
     let key = format!("{FLOOD}/{:08x}/{}", hasher.finish() >> 32, first.key);
     let alert = |state: AlertState, what: &str| EventKind::Alert {

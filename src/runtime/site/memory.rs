@@ -1,6 +1,6 @@
 //! What a restart goes on from: the memory last saved, and the steps since.
 
-use super::mute::{Mute, Mutes};
+use super::mutes::Mutes;
 use super::read_times::ReadTimes;
 use super::standing::{AlertInForce, AlertPlace, Attention, StandingAlerts};
 use super::{
@@ -14,6 +14,7 @@ use crate::monitor::{
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::delivered::delivery;
 use crate::runtime::hook::{Alert, MessageState};
+use crate::runtime::mute::Mute;
 use crate::runtime::standing::every;
 use crate::runtime::vitals::Vitals;
 use crate::store::{Delivery, DeliveryOutcome, Recorded, Store, StoreError};

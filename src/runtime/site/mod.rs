@@ -9,7 +9,7 @@ mod arrivals;
 mod flood;
 mod memory;
 mod message_rush;
-mod mute;
+mod mutes;
 mod read_times;
 mod returned;
 mod set_back;
@@ -19,18 +19,17 @@ mod timekeeper;
 mod unproven;
 mod waiting;
 
-pub(super) use arrivals::{Untimely, is_logged, untimely};
-pub use mute::Mute;
-pub(super) use mute::announce_ends;
+pub(super) use arrivals::{Untimely, untimely};
+pub(super) use mutes::announce_ends;
 pub(super) use unproven::Unproven;
 
 use message_rush::MessageRush;
-use mute::Mutes;
+use mutes::Mutes;
 use read_times::ReadTimes;
 use returned::Returned;
 use set_back::Agreeing;
 use standing::StandingAlerts;
-use timekeeper::{Lull, Timekeeper};
+use timekeeper::{PauseLength, Timekeeper};
 use waiting::WaitingReadings;
 
 use crate::monitor::{Event, EventKind, Input, Monitor, Notice, RESET_FOUND, SUSPECT, Settings};
@@ -223,12 +222,12 @@ impl Site {
 
     /// Judges by `until`, which it may be at the site, what is due without a reading; data time stays where it is. After a short time without readings
     /// only silences: where the clock is wrong, a level called by it would be too.
-    fn judge_by(&mut self, until: Timestamp, lull: Lull) -> Vec<Event> {
+    fn judge_by(&mut self, until: Timestamp, pause: PauseLength) -> Vec<Event> {
         let Some(now) = self.now.filter(|_| self.sinks.store.is_some()) else {
             return Vec::new();
         };
         let mut events = self.count_from_waiting(now, until);
-        if lull == Lull::Short {
+        if pause == PauseLength::Short {
             if self.monitor.falls_silent_by(until) {
                 events.extend(self.step(now, &passed(until, true)));
             }

@@ -17,13 +17,13 @@ const STEADY: usize = 4;
 const APART: f64 = 0.25;
 const LEAST_APART: Duration = Duration::from_secs(60);
 /// What comes together comes within this time; and what comes in blocks, mostly, within the longer one, or so many times the interval of the readings.
-const SHORT_LULL: Duration = Duration::from_secs(20);
-const LONG_LULL: Duration = Duration::from_secs(3 * 3600);
+const SHORT_PAUSE: Duration = Duration::from_secs(20);
+const LONG_PAUSE: Duration = Duration::from_secs(3 * 3600);
 const INTERVALS: u32 = 3;
 
 /// A time without readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Lull {
+pub(super) enum PauseLength {
     /// More of a block would have come.
     Short,
     /// Another block would have come, mostly.
@@ -153,16 +153,16 @@ impl Timekeeper {
 
     /// For how long no reading has come, where the host's clock, which says `host_time`, is far ahead of live ones that may be a backlog as well as right:
     /// what is due without a reading is judged by the clock then. `None` where it is not, or some have just come.
-    pub(super) fn in_doubt(&self, host_time: Timestamp) -> Option<Lull> {
+    pub(super) fn in_doubt(&self, host_time: Timestamp) -> Option<PauseLength> {
         let since = self.came?.elapsed();
-        let lull = if since < SHORT_LULL {
+        let pause = if since < SHORT_PAUSE {
             return None;
-        } else if since < LONG_LULL.max(INTERVALS * self.behind.longest_interval()) {
-            Lull::Short
+        } else if since < LONG_PAUSE.max(INTERVALS * self.behind.longest_interval()) {
+            PauseLength::Short
         } else {
-            Lull::Long
+            PauseLength::Long
         };
-        (self.latest(host_time) > self.now(host_time)).then_some(lull)
+        (self.latest(host_time) > self.now(host_time)).then_some(pause)
     }
 
     /// A reading of `benchmark` and `time` lies beyond what the clock allows, and is held. Whether those of this
@@ -244,7 +244,7 @@ mod tests {
             assert_eq!(keeper.in_doubt(host_time + hour.hours()), None, "{hour}");
             tokio::time::advance(Duration::from_secs(60)).await;
             let later = host_time + hour.hours() + 1.minute();
-            let short = (hour < 3).then_some(Lull::Short);
+            let short = (hour < 3).then_some(PauseLength::Short);
             assert_eq!(keeper.in_doubt(later), short, "{hour}");
             tokio::time::advance(Duration::from_secs(3540)).await;
             let later = host_time + (hour + 1).hours();
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_lull_is_long_after_three_hours_or_three_intervals_of_the_readings() {
+    async fn a_pause_is_long_after_three_hours_or_three_intervals_of_the_readings() {
         for (apart, long) in [(10 * 60, 3 * 3600), (2 * 3600, 6 * 3600)] {
             let (mut keeper, host_time) = (Timekeeper::default(), noon() + 1000.hours());
             for reading in 0..2 {
@@ -262,9 +262,9 @@ mod tests {
                 keeper.knows(time, true);
                 keeper.comes("5", time, host_time);
             }
-            for (after, lull) in [(long - 60, Lull::Short), (120, Lull::Long)] {
+            for (after, pause) in [(long - 60, PauseLength::Short), (120, PauseLength::Long)] {
                 tokio::time::advance(Duration::from_secs(after)).await;
-                assert_eq!(keeper.in_doubt(host_time), Some(lull), "{apart}");
+                assert_eq!(keeper.in_doubt(host_time), Some(pause), "{apart}");
             }
         }
     }

@@ -6,10 +6,10 @@
 //! clock is, or the clock is behind.
 
 use super::Site;
-use super::arrivals::is_logged;
 use crate::monitor::Input;
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::TOLERANCE;
+use crate::runtime::log::is_logged;
 use crate::runtime::tail::Arrival;
 use jiff::SignedDuration;
 use std::collections::BTreeMap;

@@ -20,7 +20,7 @@ const RENAMED_FOR: Duration = Duration::from_secs(48 * 60 * 60);
 const REMOVED_FOR: Duration = Duration::from_secs(2 * 60);
 
 /// Where a file is that has gone.
-enum Whereabouts {
+enum NewPath {
     Named(PathBuf),
     Nameless(PathBuf),
 }
@@ -41,9 +41,9 @@ impl FileTail {
         if self.place.is_none() || matches!(self.content, Content::Complete | Content::Refused(_)) {
             return Departure::Over;
         }
-        let (path, is_nameless) = match self.whereabouts() {
-            Some(Whereabouts::Named(path)) => (path, false),
-            Some(Whereabouts::Nameless(path)) => (path, true),
+        let (path, is_nameless) = match self.new_path() {
+            Some(NewPath::Named(path)) => (path, false),
+            Some(NewPath::Nameless(path)) => (path, true),
             None => return Departure::Untraced,
         };
         let same = self.departed.take().filter(|one| one.at == self.at);
@@ -88,24 +88,24 @@ impl FileTail {
         }
     }
 
-    fn whereabouts(&self) -> Option<Whereabouts> {
+    fn new_path(&self) -> Option<NewPath> {
         if self.is_at(&self.path) {
-            return Some(Whereabouts::Named(self.path.clone()));
+            return Some(NewPath::Named(self.path.clone()));
         }
         let held = self.held.as_ref();
         let inode = held.and_then(|file| file.metadata().ok());
         let is_removed = inode.as_ref().is_some_and(|inode| inode.nlink() == 0);
         if !is_removed && let Some(path) = self.in_its_folder() {
-            return Some(Whereabouts::Named(path));
+            return Some(NewPath::Named(path));
         }
         let name = (!is_removed).then(|| name_of(held?)).flatten();
         if let Some(name) = name.filter(|name| self.is_at(name)) {
-            return Some(Whereabouts::Named(name));
+            return Some(NewPath::Named(name));
         }
         // No file has this name, as long as this one is held.
         let mut name = self.origin.clone().into_os_string();
         name.push(format!(" (gone, {})", inode?.ino()));
-        Some(Whereabouts::Nameless(name.into()))
+        Some(NewPath::Nameless(name.into()))
     }
 
     fn in_its_folder(&self) -> Option<PathBuf> {

@@ -7,9 +7,10 @@ use super::text::{RefusedRows, TextReader, Unpacking};
 use crate::reading::Timestamp;
 use crate::runtime::clock::Stopwatch;
 use crate::runtime::ingest::{Item, is_packed};
+use fnv::FnvHasher;
 use std::collections::VecDeque;
 use std::fs::{File, Metadata};
-use std::hash::{DefaultHasher, Hasher};
+use std::hash::Hasher as _;
 use std::io;
 use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
@@ -52,7 +53,7 @@ pub(super) struct FileTail {
     /// Runs since it was read from its start for that.
     read_anew: Option<Stopwatch>,
     /// As of the last look that found nothing more; the file is opened only when it differs.
-    pub(super) idle: Option<Glance>,
+    pub(super) idle: Option<FileStat>,
     /// Runs since then.
     pub(super) idle_since: Option<Stopwatch>,
     /// When it was last written to, as of the last read.
@@ -126,14 +127,14 @@ impl Content {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Glance {
+pub(super) struct FileStat {
     place: FileId,
     size: u64,
     modified: (i64, i64),
     changed: Option<Timestamp>,
 }
 
-impl Glance {
+impl FileStat {
     fn at(metadata: &Metadata) -> Self {
         Self {
             place: FileId::of(metadata),
@@ -233,13 +234,13 @@ impl FileTail {
 
     /// The file under its name, or the one that is held where that is another one by now, until the next look at the
     /// folder.
-    fn glance(&self) -> io::Result<Glance> {
-        let named = std::fs::metadata(&self.path).map(|metadata| Glance::at(&metadata));
+    fn stat(&self) -> io::Result<FileStat> {
+        let named = std::fs::metadata(&self.path).map(|metadata| FileStat::at(&metadata));
         let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::NotFound;
         match (&self.held, named) {
             (Some(_), Ok(named)) if self.place == Some(named.place) => Ok(named),
             (Some(held), named) if named.as_ref().err().is_none_or(is_gone) => {
-                Ok(Glance::at(&held.metadata()?))
+                Ok(FileStat::at(&held.metadata()?))
             }
             (_, named) => named,
         }
@@ -260,19 +261,19 @@ impl FileTail {
 
     /// One read; `false` when there is no more for now.
     fn advance(&mut self) -> io::Result<bool> {
-        let glance = self.glance()?;
-        if self.idle == Some(glance) {
+        let stat = self.stat()?;
+        if self.idle == Some(stat) {
             return Ok(self.take_unended());
         }
         let file = self.open()?;
         self.is_restored = false;
-        let glance = Glance::at(&file.metadata()?);
-        if self.has_grown_packed(glance) {
+        let stat = FileStat::at(&file.metadata()?);
+        if self.has_grown_packed(stat) {
             // Known values are dropped as repeated.
             tracing::info!(file = %self.path.display(), "a packed file that has grown since it was read: read from its start");
             self.content = Content::of(&self.decoder, &self.origin);
             self.at = 0;
-        } else if !self.is_same(&file, glance)? {
+        } else if !self.is_same(&file, stat)? {
             let is_read =
                 self.at > 0 && !matches!(self.content, Content::Refused(_) | Content::Complete);
             if self.departed.is_some() {
@@ -282,11 +283,11 @@ impl FileTail {
                     self.pending.push_back(gap);
                     self.content = Content::Complete;
                 }
-                self.idle = Some(glance);
+                self.idle = Some(stat);
                 return Ok(false);
             }
-            if is_read && self.place == Some(glance.place) {
-                self.report_cut(glance.size);
+            if is_read && self.place == Some(stat.place) {
+                self.report_cut(stat.size);
             } else {
                 tracing::info!(file = %self.path.display(), at = self.at, "another file: read from its start");
             }
@@ -297,14 +298,14 @@ impl FileTail {
             self.begin_anew();
             self.read_anew = Some(Stopwatch::start());
         }
-        self.place = Some(glance.place);
-        self.modified = glance.modified;
-        self.changed = glance.changed;
+        self.place = Some(stat.place);
+        self.modified = stat.modified;
+        self.changed = stat.changed;
         let before = self.at;
         match &self.content {
             Content::Text(_) => self.read_text(&file)?,
-            Content::Packed(_) => return self.read_packed(glance),
-            Content::Mcap { .. } => self.read_record(&file, glance.size)?,
+            Content::Packed(_) => return self.read_packed(stat),
+            Content::Mcap { .. } => self.read_record(&file, stat.size)?,
             Content::Refused(_) | Content::Complete => {}
         }
         let moved = self.at != before;
@@ -312,14 +313,14 @@ impl FileTail {
             self.mark = read_at(&file, self.mark_start(), self.at - self.mark_start())?;
             // What was read before a rewriting is compared with until the file is read anew, also by the next process.
             if self.other_since.is_none() {
-                let is_at_end = self.at >= glance.size && matches!(self.content, Content::Text(_));
+                let is_at_end = self.at >= stat.size && matches!(self.content, Content::Text(_));
                 self.earlier = is_at_end.then(|| self.hash_of_earlier(&file)).transpose()?;
             }
         }
         // A suspect record is looked at again although nothing changes any more.
         let suspect =
             matches!(self.content, Content::Mcap { suspect: Some(at), .. } if at == self.at);
-        self.idle = (!moved && !suspect && self.other_since.is_none()).then_some(glance);
+        self.idle = (!moved && !suspect && self.other_since.is_none()).then_some(stat);
         self.idle_since = self.idle.map(|_| Stopwatch::start());
         Ok(moved)
     }
@@ -335,23 +336,23 @@ impl FileTail {
     }
 
     /// Whether more has been packed into the file, under its name, since it was read whole.
-    fn has_grown_packed(&self, glance: Glance) -> bool {
+    fn has_grown_packed(&self, stat: FileStat) -> bool {
         matches!(self.content, Content::Complete)
             && is_packed(&self.origin)
             && self.departed.is_none()
-            && self.place == Some(glance.place)
-            && glance.size > self.at
+            && self.place == Some(stat.place)
+            && stat.size > self.at
     }
 
     pub(super) fn mark_start(&self) -> u64 {
         self.at.saturating_sub(MARK_BYTES)
     }
 
-    fn is_same(&self, file: &File, glance: Glance) -> io::Result<bool> {
+    fn is_same(&self, file: &File, stat: FileStat) -> io::Result<bool> {
         if self.at == 0 {
             return Ok(!matches!(self.content, Content::Refused(_)));
         }
-        if self.place != Some(glance.place) || glance.size < self.at {
+        if self.place != Some(stat.place) || stat.size < self.at {
             return Ok(false);
         }
         Ok(read_at(file, self.mark_start(), self.at - self.mark_start())? == self.mark)
@@ -382,7 +383,7 @@ impl FileTail {
 
     fn hash_of_earlier(&self, file: &File) -> io::Result<u64> {
         let from = self.at.saturating_sub(EARLIER_BYTES);
-        let mut hasher = DefaultHasher::new();
+        let mut hasher = FnvHasher::default();
         hasher.write(&read_at(file, from, self.at - from)?);
         Ok(hasher.finish())
     }
@@ -404,7 +405,7 @@ impl FileTail {
     }
 
     /// One piece of a packed file; `false` when it has all been read.
-    fn read_packed(&mut self, glance: Glance) -> io::Result<bool> {
+    fn read_packed(&mut self, stat: FileStat) -> io::Result<bool> {
         let Content::Packed(unpacking) = &mut self.content else {
             return Ok(false);
         };
@@ -417,7 +418,7 @@ impl FileTail {
                 let fed = unpacking.end();
                 self.take(fed);
                 self.content = Content::Complete;
-                self.at = glance.size;
+                self.at = stat.size;
                 let file = File::open(&self.path)?;
                 self.mark = read_at(&file, self.mark_start(), self.at - self.mark_start())?;
                 Ok(true)
@@ -425,7 +426,7 @@ impl FileTail {
             Err(error) => {
                 // Perhaps it is still being packed: from its start again when it has changed.
                 self.content = Content::of(&self.decoder, &self.origin);
-                self.idle = Some(glance);
+                self.idle = Some(stat);
                 Err(error)
             }
         }

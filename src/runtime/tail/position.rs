@@ -32,8 +32,8 @@ pub(super) struct Saved {
     pub(super) at: u64,
     pub(super) place: Option<FileId>,
     pub(super) mark: Vec<u8>,
-    /// A hash of more of what stands before; none where an older version has written this.
-    #[serde(default)]
+    /// FNV-1a of more of what stands before; none where an older version has written this, whose hash a compiler might change.
+    #[serde(default, rename = "earlier_sum")]
     pub(super) earlier: Option<u64>,
     pub(super) content: SavedContent,
     /// The name under which it was found first, where it was renamed since.

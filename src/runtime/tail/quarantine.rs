@@ -3,7 +3,7 @@
 use super::file::{Content, FileTail};
 use super::text::{BadLine, LinesRead};
 use crate::runtime::ingest::IngestError;
-use crate::runtime::site::is_logged;
+use crate::runtime::log::is_logged;
 
 /// Characters of a line that are logged of it.
 const SHOWN: usize = 200;

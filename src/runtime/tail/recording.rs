@@ -3,7 +3,7 @@
 use super::file::{Content, FileTail, read_at};
 use super::records::{self, HEADER_BYTES, MAGIC, NextRecord, RawMessage, RecordFault};
 use crate::runtime::ingest::decode_message;
-use crate::runtime::site::is_logged;
+use crate::runtime::log::is_logged;
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;

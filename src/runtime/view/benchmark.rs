@@ -7,7 +7,7 @@ use crate::fit::{Observations, Rate, RateOptions};
 use crate::forecast::InverseVelocityLine;
 use crate::monitor::{
     CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime, KindShown, LevelStretch,
-    levels_in, recent,
+    levels_in,
 };
 use crate::reading::{
     BenchmarkId, Quantity, SECONDS_PER_DAY, Series, TimeSpan, Timestamp, days_since, unix_seconds,
@@ -367,7 +367,7 @@ fn line(series: &Series, latest: Option<&Event>) -> Option<[ThinPoint; 2]> {
     let until = within(series, TimeSpan::new(start, *t_max));
     let zero = days_since(start, inverse_velocity.failure_time?);
     let rates = rates(&until, RateOptions::default());
-    let segment = InverseVelocityLine::segment(recent(&rates), zero)?;
+    let segment = InverseVelocityLine::segment(InverseVelocityLine::newest(&rates), zero)?;
     Some(segment.map(|(day, height)| (SECONDS_PER_DAY.mul_add(day, unix_seconds(start)), height)))
 }
 

@@ -1,4 +1,5 @@
 //! The downhill simplex (Nelder and Mead 1965), its work bounded by count.
+//! Written here because crates for it (argmin) bound time or tolerance, and a rival must do the same work on any machine.
 
 /// A share of the cost: simplices whose corners differ by less have arrived.
 const SAME: f64 = 1e-12;

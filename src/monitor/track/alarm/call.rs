@@ -46,7 +46,7 @@ impl Alarm {
             if was_backwards {
                 self.attend_further(policy, time, cause);
             } else {
-                self.attend(policy, time, cause);
+                self.note_cause(policy, time, cause);
             }
             evidence.causes.push(cause);
         }

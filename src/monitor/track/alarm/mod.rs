@@ -115,7 +115,7 @@ impl Alarm {
 
     /// Something happened at `time` that counts for as long as a slope must be steady for its level to fall; where it is not
     /// usual it calls yellow.
-    pub(super) fn attend(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
+    pub(super) fn note_cause(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
         self.occurrences.note(policy, time, cause);
         self.count(policy, time, cause);
     }
@@ -268,7 +268,7 @@ mod tests {
         let record = record([0.0, 10.0]);
         let mut alarm = Alarm::default();
         alarm.raise(beside(&record, true), &policy(), at(1));
-        alarm.attend(&policy(), at(1), AlertCause::RegimeFlip);
+        alarm.note_cause(&policy(), at(1), AlertCause::RegimeFlip);
         let given = crate::monitor::Given::default();
         assert!(alarm.resolve(&record, at(2), &given).is_some());
         assert_eq!(alarm.level(), Level::Green);

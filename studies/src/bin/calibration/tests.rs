@@ -30,7 +30,7 @@ fn assert_calibrated(tally: &Tally) {
         let low = LEAST - three_sigma(LEAST, count);
         let high = 0.95 + three_sigma(0.95, count);
         assert!(
-            count == 0 || (low..=high).contains(&share),
+            count > 0 && (low..=high).contains(&share),
             "{what}: {share:.3} of {count}, not {low:.3} to {high:.3}"
         );
     }

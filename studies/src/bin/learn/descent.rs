@@ -6,7 +6,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use slipwatch::forecast::{INPUTS, Network, UNITS};
 
-/// Networks that are taught from different first weights; the mean of their ln odds is steadier where nothing was learnt.
+/// Networks that are trained from different first weights; the mean of their ln odds is steadier where nothing was learnt.
 pub(crate) const NETWORKS: usize = 4;
 const BATCH: usize = 256;
 /// The first step, and its least share.
@@ -42,8 +42,8 @@ struct Adam {
     steps: i32,
 }
 
-/// The mean of the first `networks`, each taught in so many passes over `rows`.
-pub(crate) fn teach(rows: &[Row], passes: usize, networks: usize) -> Network {
+/// The mean of the first `networks`, each trained in so many passes over `rows`.
+pub(crate) fn train(rows: &[Row], passes: usize, networks: usize) -> Network {
     let seeds: Vec<u64> = (1..).take(networks).collect();
     let each = in_two(&seeds, |seed| vec![one(rows, passes, *seed)]);
     let mut mean = Network::silent();

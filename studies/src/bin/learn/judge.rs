@@ -1,4 +1,4 @@
-//! How a network does on slopes of a family that taught it nothing.
+//! How a network does on slopes of a family on which it was not trained.
 
 use crate::looks::{about_the_end, first, in_two};
 use jiff::SignedDuration;

@@ -21,7 +21,7 @@ const LIKELIEST: (usize, usize) = (16, 3);
 const CUT: f64 = 0.4;
 /// Looks before an end reach back so far, days.
 const FARTHEST_DAYS: f64 = 60.0;
-/// The shortest lead, intervals between readings: of looks that teach, and of looks that judge.
+/// The shortest lead, intervals between readings: of looks for training, and of looks for judging.
 const LAST_LOOK: (f64, f64) = (1.0, 2.0);
 /// The same, days.
 const SHORTEST_DAYS: f64 = 1.0 / 24.0;
@@ -86,7 +86,7 @@ pub(crate) fn in_two<J: Sync, T: Send>(jobs: &[J], work: impl Fn(&J) -> Vec<T> +
     made.into_iter().flat_map(|(_, each)| each).collect()
 }
 
-/// The rows that one look teaches: a span each, as far as it is known whether a collapse came within it.
+/// The rows for training that one look gives: a span each, as far as it is known whether a collapse came within it.
 pub(crate) fn rows(look: &Look) -> impl Iterator<Item = Row> {
     let weight = weight(look.family);
     let known = look.questions.iter().filter_map(move |(span, inputs)| {

@@ -1,15 +1,15 @@
-//! Teaches the network that gives the chance of a collapse, on simulated slopes alone.
+//! Trains the network that gives the chance of a collapse, on simulated slopes alone.
 //!
-//! - `learn [SLOPES]` teaches it on so many slopes of each family and writes src/forecast/learned.txt.
-//! - `learn --left-out [SLOPES] [--failing]` teaches one network for each family on all the others, judges each family by
-//!   the network that never saw it, and writes docs/families.md. That takes hours: a network that is taught is kept in
+//! - `learn [SLOPES]` trains it on so many slopes of each family and writes src/forecast/learned.txt.
+//! - `learn --left-out [SLOPES] [--failing]` trains one network for each family on all the others, judges each family by
+//!   the network that never saw it, and writes docs/families.md. That takes hours: a network that is trained is kept in
 //!   target/left-out, and the next run goes on from there. `--failing`: the families that fail alone.
 //!
 //! - `learn --years` follows years of standing slopes, and lives of failing ones, by the network in force and writes docs/false-alarms.md.
 //! - `learn --steady [SERIES]` follows so many series of steady creep, and of a rate that doubles and stays, and writes
 //!   docs/steady-creep.md.
 //!
-//! Slopes that teach have seeds from 0 on, those that judge from 1,000,000 on.
+//! Slopes for training have seeds from 0 on, those for judging from 1,000,000 on.
 
 #![expect(clippy::print_stderr, reason = "progress is what it prints")]
 #![expect(
@@ -26,17 +26,17 @@ mod steady;
 mod table;
 mod years;
 
-use descent::{NETWORKS, Row, teach};
+use descent::{NETWORKS, Row, train};
 use judge::Judged;
 use looks::Look;
 use slipwatch::forecast::Network;
 use studies::Family;
 
-/// Slopes of each family that teach, unless another number is given.
+/// Slopes of each family for training, unless another number is given.
 const SLOPES: u64 = 1000;
 /// Steady series, unless another number is given.
 const STEADY: u64 = 500;
-/// Passes over the looks: a first network finds the looks that mislead it, the second is taught on those too.
+/// Passes over the looks: a first network finds the looks that mislead it, the second is trained on those too.
 const PASSES: (usize, usize) = (6, 12);
 fn main() -> anyhow::Result<()> {
     let mut arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -64,8 +64,8 @@ fn main() -> anyhow::Result<()> {
     source::write(&Material::of(slopes).learn(None))
 }
 
-/// Each of `families` judged by a network that was taught on all the others; those that an earlier run has taught are not
-/// taught again.
+/// Each of `families` judged by a network that was trained on all the others; those that an earlier run has trained are not
+/// trained again.
 fn left_out(families: &[Family], slopes: u64) -> anyhow::Result<Vec<Judged>> {
     let missing = families.iter().copied();
     let missing: Vec<Family> = missing
@@ -75,7 +75,7 @@ fn left_out(families: &[Family], slopes: u64) -> anyhow::Result<Vec<Judged>> {
         let material = Material::of(slopes);
         let written = looks::in_two(&missing, |family| {
             let network = material.learn(Some(*family));
-            eprintln!("taught without {family:?}");
+            eprintln!("trained without {family:?}");
             vec![source::keep(&network, *family, slopes)]
         });
         written.into_iter().collect::<anyhow::Result<()>>()?;
@@ -88,7 +88,7 @@ fn left_out(families: &[Family], slopes: u64) -> anyhow::Result<Vec<Judged>> {
     judged.collect()
 }
 
-/// What networks are taught on.
+/// What networks are trained on.
 struct Material {
     looks: Vec<Look>,
     /// Of which only those count that mislead.
@@ -110,15 +110,15 @@ impl Material {
         material
     }
 
-    /// A network taught on all families but one.
+    /// A network trained on all families but one.
     fn learn(&self, without: Option<Family>) -> Network {
         let counts = |look: &&Look| Some(look.family) != without;
         let looks = self.looks.iter().filter(counts);
         let mut rows: Vec<Row> = looks.flat_map(looks::rows).collect();
-        let first = teach(&rows, PASSES.0, 1);
+        let first = train(&rows, PASSES.0, 1);
         let standing: Vec<&Look> = self.standing.iter().filter(counts).collect();
         let misleading = looks::misleading(&first, &standing);
         rows.extend(misleading.into_iter().flat_map(looks::rows));
-        teach(&rows, PASSES.1, NETWORKS)
+        train(&rows, PASSES.1, NETWORKS)
     }
 }

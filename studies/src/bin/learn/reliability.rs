@@ -70,8 +70,8 @@ fn looks(slope: &Simulated, network: &Network) -> Vec<Said> {
 fn table(said: &[Said]) -> anyhow::Result<String> {
     let mut out = format!(
         "\n### Whether what is said comes true\n\n\
-         Of {LIVES} other lives of each of these families, by the network that never saw it, and of {LIVES} of each family that stands, by the network in force: \
-         {LOOKS} looks evenly over each life. What came of the chances in each class: mean said → share that came. *Log score*: the mean of −ln of the chance given to what \
+         Of {LIVES} other slopes of each of these families, by the network that never saw it, and of {LIVES} of each family that stands, by the network in force: \
+         {LOOKS} evaluations evenly over each record. What came of the chances in each class: mean said → share that came. *Log score*: the mean of −ln of the chance given to what \
          came, less is better. Only those of `chances_of_collapse` are meant to come true: the others are raised or lowered on purpose (src/forecast/collapse.rs).\n\n\
          | within | chances |"
     );

@@ -19,7 +19,7 @@ pub(crate) fn in_force() -> anyhow::Result<Network> {
     Ok(Network::from_text(&text))
 }
 
-/// Keeps a network that so many slopes of every family but one have taught.
+/// Keeps a network that was trained on so many slopes of every family but one.
 pub(crate) fn keep(network: &Network, without: Family, slopes: u64) -> anyhow::Result<()> {
     let file = place(without, slopes);
     let folder = file.parent().unwrap_or(Path::new("."));

@@ -17,9 +17,9 @@ fn text(families: &[Judged], slopes: u64) -> anyhow::Result<String> {
         ""
     };
     let mut out = format!(
-        "# Forecasts on families of slopes that taught them nothing\n\n\
+        "# Forecasts on families of slopes on which they were not trained\n\n\
          Written by `cargo run --release -p studies --bin learn -- --left-out {slopes}{only}`. Each family of simulated slopes (studies/src/world) is judged by a \
-         network that was taught on all the other families, {slopes} slopes each, and never saw one of it. The network in force is taught on all \
+         network that was trained on all the other families, {slopes} slopes each, and never saw one of it. The network in force is trained on all \
          of them; what it is worth on a slope of no family here, nobody knows better than this table does.\n"
     );
     failing(&mut out, families)?;
@@ -27,7 +27,7 @@ fn text(families: &[Judged], slopes: u64) -> anyhow::Result<String> {
     out += &reliability::section(slopes)?;
     out += include_str!("notes.md");
     if families.iter().all(|one| one.family.fails()) {
-        out += "\nFamilies that stand were not judged in this run. What the network in force calls on them, which was taught on others of the same \
+        out += "\nFamilies that stand were not judged in this run. What the network in force calls on them, which was trained on others of the same \
                 families: [false-alarms.md](false-alarms.md).\n";
         return Ok(out);
     }
@@ -96,7 +96,7 @@ fn best_rival(leads: &[Lead]) -> (&'static str, f64) {
 fn in_time(out: &mut String, families: &[Judged]) -> anyhow::Result<()> {
     writeln!(
         out,
-        "\n### Red in time\n\nOf the failing lives read at least four times an evacuation time and seen to accelerate for as long: the share for which red was called at least \
+        "\n### Red in time\n\nOf the failing slopes read at least four times an evacuation time and seen to accelerate for as long: the share for which red was called at least \
          that time before the collapse.\n\n| family | 12 h | 24 h | 72 h |\n|---|---|---|---|"
     )?;
     let fails = families.iter().filter(|one| one.family.fails());
@@ -122,7 +122,7 @@ pub(crate) const HEAD: &str = "| years | reds a year | oranges a year | time at 
 fn standing(out: &mut String, families: &[Judged]) -> anyhow::Result<()> {
     writeln!(
         out,
-        "\n## Slopes that stand\n\nWhole lives, at every reading or at 1,500 of them evenly, evacuation time 24 h; alarms less than three days apart are one. Stopped and Plateau \
+        "\n## Slopes that stand\n\nWhole records, at every reading or at 1,500 of them evenly, evacuation time 24 h; alarms less than three days apart are one. Stopped and Plateau \
          accelerate as failing slopes do, and only then stop.\n\n| family {HEAD}"
     )?;
     for one in families.iter().filter(|one| !one.family.fails()) {

@@ -32,8 +32,8 @@ fn by_chance(
 ) -> anyhow::Result<String> {
     let mut out = String::from(
         "\n## What another `red_chance` gives\n\n\
-         The same years, and lives of the eight families that fail (other seeds than any above or in [families.md](families.md); the network in force \
-         was taught on others of the same families), with red called from another chance within 48 h on. *In time*: of the failing lives read at \
+         The same years, and simulated records of the eight families that fail (other seeds than any above or in [families.md](families.md); the network in force \
+         was trained on others of the same families), with red called from another chance within 48 h on. *In time*: of the failing slopes read at \
          least each 6 h and seen to accelerate for a day or more, those that were red 24 h before the collapse or earlier. Whoever asks for fewer false \
          alarms pays in slopes that are called too late.\n\n| `red_chance` | in time |",
     );
@@ -72,7 +72,7 @@ fn text(families: &[(Family, Vec<Vec<Replay>>)]) -> anyhow::Result<String> {
     let mut out = String::from(
         "# False alarms a year\n\n\
          Written by `cargo run --release -p studies --bin learn -- --years`. Each row follows whole years of simulated slopes that stand \
-         (studies/src/world), looked at each two hours, or at each reading where these are further apart, by the network in force, which was taught on other \
+         (studies/src/world), looked at each two hours, or at each reading where these are further apart, by the network in force, which was trained on other \
          slopes of these families. Evacuation time 24 h, so that red looks 48 h ahead; the policy's rules, without its latch: a chance calls red once it has come to .2 in the mean over some twelve hours as well (of the ln of its odds), or to .6 at one look; alarms less than three days \
          apart are one. What drives a slope: rain 5 to 40 storms a year, frost and thaw 60, a draw-down of the reservoir in most years, 5 to 60 \
          fits of stick-slip, one change of rate, several resets of the instrument, or one acceleration that ends without a collapse \

@@ -137,7 +137,7 @@ fn of_growing(growing: &SweepReport) -> Result<Vec<Claim>> {
         Claim {
             paper: "secondary best fits from m = -3000 to m = 29 before the end of 1986".to_owned(),
             here: format!(
-                "minima from m = {} to m = {} (we look from -20 to 29 only)",
+                "minima from m = {} to m = {} (searched from -20 to 29 only)",
                 m_text(low),
                 m_text(high)
             ),

@@ -54,7 +54,7 @@ pub(crate) fn brier_section(out: &mut String, scored: &Scored) {
     // Writing to a string cannot fail.
     let _ = writeln!(
         out,
-        "\n## Passing the critical velocity within a time\n\nOver all looks at simulated slopes of which it is known: {LOOKS_AT_FAILING} evenly over the readings \
+        "\n## Passing the critical velocity within a time\n\nOver all evaluations of simulated slopes of which it is known: {LOOKS_AT_FAILING} evenly over the readings \
          of each that fails, its leads above, and {} days before the failure where it is read so often; {LOOKS} evenly over each that \
          stands. The looks beside those leads are in no table above. Brier skill, 1 − Brier score / that of the base rate over the same looks (90 % interval, the \
          base rate held). Above 0 is better than the base rate; a point forecast gives 0 or 1.",
@@ -162,13 +162,15 @@ pub(crate) fn levels_section(out: &mut String, scored: &Scored) {
         row
     };
     grid(out, &lead_head("", &leads, &[]), &Called::ALL.map(row));
-    out.push_str("\nStanding slopes: share of looks, and of slopes at one look or more:\n");
+    out.push_str(
+        "\nStanding slopes: share of evaluations, and of slopes at one evaluation or more:\n",
+    );
     let head = [
         "fate",
         "slopes",
-        "looks red",
-        "looks orange",
-        "looks yellow",
+        "evaluations red",
+        "orange",
+        "yellow",
         "slopes ever red",
         "slopes ever orange",
     ];

@@ -76,7 +76,7 @@ pub(crate) struct Evaluation {
     pub(crate) lead_days: Option<f64>,
 }
 
-/// Leads of simulated lives that methods are compared at, days.
+/// Leads of simulated records that methods are compared at, days.
 pub(crate) const SIMULATED_LEADS: [f64; 5] = [40.0, 20.0, 10.0, 5.0, 2.0];
 /// Leads beside those, for what is reported of the last days.
 pub(crate) const SHORT_LEADS: [f64; 3] = [1.0, 0.5, 0.2];

@@ -72,7 +72,7 @@ may not be redistributed, and without them their sections are left out.
 - A method that has nothing to say is scored as saying that no failure comes.
 - A lead that a gap in the readings makes more than twice as long is left out; the time that remains is counted from the newest reading.
 - {seeds}
-- Intervals are 90 %, of a bootstrap over series: a slope with all its looks is drawn again, never a single look.
+- Intervals are 90 %, of a bootstrap over series: a slope with all its evaluations is drawn again, never a single evaluation.
 
 *Measured* are instruments' readings. A *reconstruction* is made to fulfil what a publication states, and confirms nothing about its
 site. *Simulated* slopes follow the law that `slider-block` fits, which favours it and the panel; their load, noise, gaps and resets are

@@ -56,10 +56,10 @@ pub(crate) fn section(out: &mut String, scored: &Scored) {
     grid(out, &head, &rows);
     let _ = writeln!(
         out,
-        "\nLooks at which a method's median predicted a collapse before the end of the record, and in {} to {}, when its contemporaries expected one:",
+        "\nEvaluations at which a method's median predicted a collapse before the end of the record, and in {} to {}, when its contemporaries expected one:",
         FEARED[0], FEARED[1]
     );
-    let head = ["method", "looks", "before the end", "in those years"];
+    let head = ["method", "evaluations", "before the end", "in those years"];
     let rows = scored
         .methods
         .iter()

@@ -1,7 +1,7 @@
 //! Scores every method's forecasts of the time of failure as they would have been made: `skill`.
 //!
-//!     cargo run --release -p studies --bin skill                        on the training lives, and the recordings
-//!     cargo run --release -p studies --bin skill -- --judged            on the lives that nothing was tuned on
+//!     cargo run --release -p studies --bin skill                        on the training records, and the recordings
+//!     cargo run --release -p studies --bin skill -- --judged            on the records that nothing was tuned on
 //!     cargo run --release -p studies --bin skill -- --judged --write    the same into docs/skill.md
 //!     cargo run --release -p studies --bin skill -- --simulated 70 --records records.ndjson
 //!
@@ -40,10 +40,10 @@ use sums::Scored;
 /// Scores forecasts of the time of failure.
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// Simulated lives, beside the recordings.
+    /// Simulated records, beside the recordings.
     #[arg(long, default_value_t = Corpus::LIVES)]
     simulated: u64,
-    /// On the lives that are kept for judgement; without it, on those for training.
+    /// On the records that are kept for judgement; without it, on those for training.
     #[arg(long)]
     judged: bool,
     /// Only these methods; all where none is named.
@@ -76,7 +76,7 @@ fn main() -> Result<()> {
         bail!("no such method: expected one of {}", known.join(", "));
     }
     if arguments.simulated > Corpus::LIVES {
-        bail!("at most {} simulated lives", Corpus::LIVES);
+        bail!("at most {} simulated records", Corpus::LIVES);
     }
     let recorded = recorded::load(|heading| eprintln!("left out: {heading} (no measured data)"))?;
     let corpus = if arguments.judged {

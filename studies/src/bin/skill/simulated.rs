@@ -90,7 +90,7 @@ pub(crate) fn coverage(scored: &Scored, name: &str, lead: f64) -> Option<f64> {
     average(&sums(&scored.failing, name, &score))
 }
 
-/// The panel's PIT by tenths at the leads, of those where it spoke.
+/// The panel's PIT by tenths at the leads, of those where it gave a forecast.
 pub(crate) fn pit_counts(scored: &Scored) -> [u32; 10] {
     let records = scored.failing.iter().flat_map(|one| &one.records);
     let panel = records.filter(|record| record.method == PANEL && is_at_a_lead(record));
@@ -143,8 +143,8 @@ fn others(out: &mut String, scored: &Scored) {
     let counts = pit_counts(scored).map(|count| count.to_string());
     let _ = writeln!(
         out,
-        "\nProbability integral transform of the panel, by tenths, over these leads where it spoke (even if calibrated; the first: \
-         failures sooner than it thought): {}.\n\n![PIT of the panel](skill/pit.svg)",
+        "\nProbability integral transform of the panel, by tenths, over these leads where it gave a forecast (even if calibrated; the first: \
+         failures sooner than forecast): {}.\n\n![PIT of the panel](skill/pit.svg)",
         counts.join(", ")
     );
 }

@@ -212,12 +212,12 @@ fn table_of(out: &mut String, one: &SeriesForecasts, scored: &Scored) {
 
 /// The section on what stood.
 pub(crate) fn stood_section(out: &mut String, scored: &Scored) {
-    out.push_str("\n## Measured and reconstructed series that stood\n\nMean CRPS, days, of the panel and of the inverse-velocity line; the panel's highest chances, and looks at which the figures above call a level. \
+    out.push_str("\n## Measured and reconstructed series that stood\n\nMean CRPS, days, of the panel and of the inverse-velocity line; the panel's highest chances, and evaluations at which the figures above call a level. \
                   A method that never predicts anything has a CRPS of 0 here.\n");
     let head = [
         "series",
         "kind",
-        "looks",
+        "evaluations",
         "panel",
         "line",
         "highest in 24 h",

@@ -14,7 +14,7 @@ const HEAD: &str = "| when | method | forecasts | silent | CRPS, days | ours ove
 const ABOUT: &str = "Forecasts as they would have been made, scored against what came. In brackets, 90 % intervals of a bootstrap \
 over series. A method that had nothing to say is scored as saying that no failure comes; `silent` counts it. `ours over it` is the \
 first method's mean CRPS over that of the row: under 1, the first is better. `in 90 %`: failures within the central 90 % of \
-those that spoke; a point forecast has no interval. Series of \
+those that gave a forecast; a point forecast has no interval. Series of \
 one site share their failure, so the intervals of several are too narrow; one series alone has none.\n";
 
 /// The whole text.

@@ -136,7 +136,7 @@ pub(crate) fn targets(out: &mut String, scored: &Scored) {
             format!("{} of looks", percent(red)),
         );
         row(
-            format!("{name} slopes that stand: orange at under 2 % of looks"),
+            format!("{name} slopes that stand: orange at under 2 % of evaluations"),
             orange.is_some_and(|orange| orange < ORANGE),
             format!("{} of looks", percent(orange)),
         );

@@ -1,6 +1,6 @@
 //! What the config names and the files do not have.
 
-use super::view::{Preview, Refusal, SourceView, Unfed};
+use super::view::{BenchmarkWithoutReadings, Preview, Refusal, SourceView};
 use crate::config::Config;
 use crate::reading::BenchmarkId;
 
@@ -8,12 +8,15 @@ use crate::reading::BenchmarkId;
 const NAME_THEM: &str = "name the column [ID_]displacement_UNIT or [ID_]velocity_UNIT, or say in [[benchmark]] its column and unit";
 
 /// By what `preview` shows of the files; nothing where they were not all read.
-pub(super) fn unfed(preview: &Preview, config: &Config) -> Vec<Unfed> {
+pub(super) fn without_readings(
+    preview: &Preview,
+    config: &Config,
+) -> Vec<BenchmarkWithoutReadings> {
     if !preview.is_whole {
         return Vec::new();
     }
     let fed = || preview.benchmarks.iter().filter(|one| one.readings > 0);
-    let mut unfed = Vec::new();
+    let mut without_readings = Vec::new();
     for view in &preview.sources {
         let has = |id: &BenchmarkId| fed().any(|one| one.source == view.id && one.id == *id);
         let mut named = config
@@ -33,20 +36,24 @@ pub(super) fn unfed(preview: &Preview, config: &Config) -> Vec<Unfed> {
         {
             absent.push(None);
         }
-        unfed.extend(absent.into_iter().map(|benchmark| Unfed {
-            text: why(view, benchmark.as_ref(), config),
-            benchmark,
-            source: view.id.clone(),
-        }));
+        without_readings.extend(
+            absent
+                .into_iter()
+                .map(|benchmark| BenchmarkWithoutReadings {
+                    text: why(view, benchmark.as_ref(), config),
+                    benchmark,
+                    source: view.id.clone(),
+                }),
+        );
     }
-    if unfed.is_empty() && fed().next().is_none() && config.brokers.is_empty() {
-        unfed.push(Unfed {
+    if without_readings.is_empty() && fed().next().is_none() && config.brokers.is_empty() {
+        without_readings.push(BenchmarkWithoutReadings {
             benchmark: None,
             source: String::new(),
             text: format!("no file has readings of a benchmark: nothing is watched; {NAME_THEM}"),
         });
     }
-    unfed
+    without_readings
 }
 
 /// What is said of benchmarks of one source that name one column: none of them is read from a file that is not named after it.

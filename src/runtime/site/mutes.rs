@@ -1,49 +1,21 @@
-//! Who asked not to be notified, of what, until when: never for longer than an order may last, whatever the clock says.
+//! Who asked not to be notified, of what, until when.
 
 use super::Site;
 use super::standing::Attention;
 use crate::alert::Level;
 use crate::monitor::{AlertState, EventKind, Order};
 use crate::reading::{BenchmarkId, Timestamp};
-use crate::runtime::clock::{Stopwatch, TOLERANCE};
+use crate::runtime::clock::Stopwatch;
 use crate::runtime::hook::Alert;
-use crate::runtime::standing::{every_since, lasts};
+use crate::runtime::mute::Mute;
+use crate::runtime::standing::every_since;
 use crate::store::StoreError;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// Orders in force at most; the oldest goes.
 const MOST: usize = 256;
 /// Ends of alerts that are kept through a silence at most; the oldest goes.
 const MOST_PUT_OFF: usize = 4096;
-
-/// Alerts of which nobody is notified for a time.
-#[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
-pub struct Mute {
-    /// `None`: of the whole site.
-    pub benchmark: Option<BenchmarkId>,
-    /// Nothing above it is muted; `None`: everything is.
-    pub up_to: Option<Level>,
-    /// Its end, by the host's clock.
-    pub until: Timestamp,
-    /// When it was given, by the host's clock; `None` where an older version took it.
-    #[serde(default)]
-    pub given_at: Option<Timestamp>,
-}
-
-impl Mute {
-    /// Whether it is in force while the host's clock says `host_time`, by which it was given, right or wrong. Of one that would last
-    /// longer than it may, that clock has been set since.
-    fn is_in_force(&self, host_time: Timestamp) -> bool {
-        let longest = match self.up_to {
-            Some(_) => Order::LONGEST_SHELVE,
-            None => Order::LONGEST_SILENCE,
-        };
-        let left = self.until.duration_since(host_time);
-        left <= longest + TOLERANCE && lasts((self.given_at, self.until), host_time)
-    }
-}
 
 /// An order, and the time that it has left by a stopwatch: a clock that is set back by less than what counts as wrong does not
 /// prolong it.
