@@ -28,4 +28,4 @@ if [ -r "$token_file" ]; then
     printf 'header = "Authorization: Bearer %s"\n' "$(tr -d '\r\n' <"$token_file")"
 fi | curl --config - --fail --silent --show-error --max-time 8 --output /dev/null \
     --header "Title: $title" --header "Priority: $priority" --header "Tags: slipwatch,$SLIPWATCH_LEVEL" \
-    --data-binary "$text" "$1"
+    --data-raw "$text" "$1"

@@ -9,9 +9,12 @@ use crate::runtime::run as daemon;
 use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
 use anyhow::Context;
+use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+/// Open files that are asked for.
+const MOST_FILES: u64 = 65_536;
 /// How long threads that still wait may take at the end.
 const LAST_THREADS: Duration = Duration::from_secs(1);
 
@@ -39,6 +42,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     for warning in &config.warnings {
         tracing::warn!(%warning, "doubtful config");
     }
+    allow_files();
     let runtime = asynchronous()?;
     let ended = runtime.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
@@ -49,6 +53,21 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // All is closed by now; a name server that does not answer keeps a thread for up to a minute.
     runtime.shutdown_timeout(LAST_THREADS);
     ended
+}
+
+/// As many open files as this user may have, up to what the packaged unit allows: files that are followed, callers of the page and
+/// messages that wait for an answer are not to take what a hook needs.
+fn allow_files() {
+    let raised = getrlimit(Resource::RLIMIT_NOFILE).and_then(|(soft, hard)| {
+        setrlimit(
+            Resource::RLIMIT_NOFILE,
+            soft.max(hard.min(MOST_FILES)),
+            hard,
+        )
+    });
+    if let Err(error) = raised {
+        tracing::warn!(%error, "the limit of open files stays as it is");
+    }
 }
 
 /// The runtime that the daemon and a replay need.

@@ -21,6 +21,11 @@ pub trait Destination: Any + Debug + Send + Sync {
         false
     }
 
+    /// Whether it keeps alerts in memory alone, so that those in force are sent to it again and again.
+    fn forgets(&self) -> bool {
+        false
+    }
+
     /// The files whose content it takes when it is set up.
     fn reads(&self) -> Vec<PathBuf> {
         Vec::new()

@@ -54,6 +54,10 @@ impl Destination for Webhook {
         self.format == WebhookFormat::Alertmanager
     }
 
+    fn forgets(&self) -> bool {
+        self.format == WebhookFormat::Alertmanager
+    }
+
     fn reads(&self) -> Vec<PathBuf> {
         let files = [&self.secret_file, &self.ca_file];
         files.into_iter().flatten().cloned().collect()

@@ -1,6 +1,6 @@
 //! The levels in force at a benchmark over time, from the alerts that entered and left them.
 
-use super::event::{AlertState, Event, EventKind};
+use super::event::{AlertState, Event, EventKind, REMOVED};
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, TimeSpan, Timestamp};
 use schemars::JsonSchema;
@@ -55,19 +55,29 @@ pub fn levels_in(
 }
 
 /// `events` by the times that they are of: those of the past before a first start are found after those of the present. No alert ends
-/// before it has begun, as by time one does whose end came with a backlog.
+/// before it has begun, as by time one does whose end came with a backlog; and what is called at a benchmark that was taken out of the
+/// config and put back, whose readings are read again, does not begin before what was ended when it was taken out.
 pub fn by_time(events: Vec<Event>) -> Vec<Event> {
     let mut begun: BTreeMap<String, Timestamp> = BTreeMap::new();
+    let mut taken_out: BTreeMap<Option<BenchmarkId>, Timestamp> = BTreeMap::new();
     let mut placed: Vec<(Timestamp, Event)> = Vec::with_capacity(events.len());
     for event in events {
         let mut place = event.time;
-        if let EventKind::Alert { key, state, .. } = &event.kind {
+        if let EventKind::Alert {
+            key, state, rule, ..
+        } = &event.kind
+        {
             match state {
                 AlertState::Firing => {
-                    begun.insert(key.clone(), event.time);
+                    let ended = taken_out.get(&event.benchmark);
+                    place = ended.map_or(place, |ended| place.max(*ended));
+                    begun.insert(key.clone(), place);
                 }
                 AlertState::Resolved => {
                     place = begun.get(key).map_or(place, |begun| place.max(*begun));
+                    if rule == REMOVED {
+                        taken_out.insert(event.benchmark.clone(), place);
+                    }
                 }
             }
         }
@@ -98,6 +108,8 @@ impl LevelCourse {
         if level == self.level {
             return;
         }
+        // Of a benchmark that was put back, what its readings call again may have been before.
+        let at = at.max(self.since);
         if at > self.since {
             self.past.push(LevelStretch {
                 level: self.level,
@@ -125,6 +137,33 @@ impl LevelCourse {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_called_again_after_a_benchmark_was_put_back_stands() {
+        let at = |hour: i64| Timestamp::from_second(3600 * hour).unwrap();
+        let alert = |hour, key: &str, state, rule: &str| Event {
+            time: at(hour),
+            benchmark: Some(BenchmarkId::new("5")),
+            kind: EventKind::Alert {
+                level: Level::Red,
+                state,
+                key: key.to_owned(),
+                rule: rule.to_owned(),
+                text: String::new(),
+            },
+        };
+        let events = vec![
+            alert(10, "first", AlertState::Firing, ""),
+            alert(11, "first", AlertState::Resolved, REMOVED),
+            alert(5, "past", AlertState::Firing, ""),
+            alert(6, "past", AlertState::Resolved, ""),
+            alert(8, "again", AlertState::Firing, ""),
+        ];
+        assert_eq!(by_time(events.clone()), events);
+        let span = TimeSpan::new(at(0), at(20));
+        let (levels, _) = levels_in(&events, events[0].benchmark.as_ref(), span);
+        assert_eq!(levels.last().map(|last| last.level), Some(Level::Red));
+    }
 
     #[test]
     fn the_end_that_a_backlog_brings_stands_after_the_beginning() {

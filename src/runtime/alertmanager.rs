@@ -7,8 +7,8 @@ use crate::reading::{BEFORE_ALL, BenchmarkId, TimeSpan, Timestamp};
 use jiff::SignedDuration;
 use serde_json::json;
 
-/// Alertmanager ends an alert that states no end and is not repeated, after five minutes. Ours stands until we say that it has
-/// ended, so it states an end that no crisis reaches.
+/// Alertmanager ends an alert that states no end and is not repeated, after five minutes. Ours is repeated, but it stands until we say
+/// that it has ended, also while the daemon does not run: it states an end that no crisis reaches.
 const STANDS_FOR: SignedDuration = SignedDuration::from_hours(365 * 24);
 
 /// A list of this alert and of what ends with it: the lower levels that it has superseded, and at the end of what was reported
@@ -21,7 +21,7 @@ pub(super) fn body(
 ) -> Result<Vec<u8>, serde_json::Error> {
     let time = alert.event.time;
     let lasts = match alert.state {
-        MessageState::Firing => TimeSpan::new(time, time.checked_add(STANDS_FOR).unwrap_or(time)),
+        MessageState::Firing => without_end(alert),
         MessageState::Resolved | MessageState::Correction => {
             let called = alert.called.or_else(|| since(&alert.key)).unwrap_or(time);
             TimeSpan::new(called.min(time), time)
@@ -45,6 +45,26 @@ pub(super) fn body(
         ));
     }
     serde_json::to_vec(&all)
+}
+
+/// A list of alerts in force with their links, as they were sent before.
+pub(super) fn in_force<'a>(
+    alerts: impl Iterator<Item = (&'a Alert, &'a Option<String>)>,
+) -> Result<Vec<u8>, serde_json::Error> {
+    let all = alerts.map(|(alert, link)| {
+        let own = (
+            alert.event.benchmark.as_ref(),
+            alert.level,
+            alert.key.as_str(),
+        );
+        entry(alert, own, without_end(alert), link.as_deref())
+    });
+    serde_json::to_vec(&all.collect::<Vec<_>>())
+}
+
+fn without_end(alert: &Alert) -> TimeSpan {
+    let time = alert.event.time;
+    TimeSpan::new(time, time.checked_add(STANDS_FOR).unwrap_or(time))
 }
 
 /// An alert by its benchmark, level and key, with what `alert` says.

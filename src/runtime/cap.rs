@@ -51,6 +51,7 @@ enum MessageType {
 pub(super) static CAP: WayOut = WayOut {
     table: "cap",
     send: |delivery| Box::pin(send(delivery)),
+    repeat: None,
     ready: |hook| {
         let cap: &CapFolder = destination(hook)?;
         let folder = cap.folder.display();

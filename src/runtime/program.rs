@@ -24,6 +24,7 @@ pub(super) static PROGRAM: WayOut = WayOut {
             run_program(&hook, &alert, attempt, link.as_deref()).await
         })
     },
+    repeat: None,
     ready: |hook| runnable(&hook.program()),
 };
 

@@ -8,6 +8,9 @@ use std::sync::Arc;
 /// An attempt that is under way.
 pub type Run = Pin<Box<dyn Future<Output = HookOutcome> + Send>>;
 
+/// What sends alerts in force again, which is no attempt to deliver them.
+pub type Repeat = fn(Arc<HookConfig>, Vec<Alert>) -> Pin<Box<dyn Future<Output = ()> + Send>>;
+
 /// A way by which alerts get out; each stands in the file of its sender, and has a row in
 /// [`WAYS_OUT`](super::ways_out::WAYS_OUT). What the config says of it is a [`Destination`], whose keys are read by a row of
 /// `config/hook.rs`.
@@ -17,6 +20,8 @@ pub struct WayOut {
     pub table: &'static str,
     /// Makes one attempt. It ends in the hook's timeout, and logs how it ended.
     pub send: fn(DeliveryAttempt) -> Run,
+    /// Sends alerts in force again to a destination that forgets them; it logs where that fails.
+    pub repeat: Option<Repeat>,
     /// Whether an attempt could be made on this machine, for `doctor`; none is.
     pub ready: fn(&HookConfig) -> Result<String, String>,
 }

@@ -3,7 +3,7 @@
 use super::hook::{Alert, HookOutcome, state_name};
 use super::way_out::{DeliveryAttempt, WayOut, destination};
 use super::{alertmanager, clock, http, link, tls};
-use crate::config::{Secret, Webhook, WebhookFormat};
+use crate::config::{HookConfig, Secret, Webhook, WebhookFormat};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use hmac::{Hmac, KeyInit, Mac};
@@ -12,6 +12,7 @@ use hyper::body::Bytes;
 use hyper::{Method, Request, header};
 use sha2::Sha256;
 use std::fmt::Write as _;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// What distinguishes a message from every other, the same at each attempt: one key fires and is resolved. It may hold no full
@@ -43,6 +44,7 @@ fn signature(key: &[u8], id: &str, timestamp: i64, body: &[u8]) -> Option<String
 pub(super) static WEBHOOK: WayOut = WayOut {
     table: "webhook",
     send: |delivery| Box::pin(send(delivery)),
+    repeat: Some(|hook, alerts| Box::pin(repeat(hook, alerts))),
     ready: |hook| {
         let webhook: &Webhook = destination(hook)?;
         let name = &webhook.name;
@@ -79,6 +81,32 @@ async fn send(delivery: DeliveryAttempt) -> HookOutcome {
         "webhook ended"
     );
     outcome
+}
+
+/// Sends what is in force once more to Alertmanager, in one message.
+async fn repeat(hook: Arc<HookConfig>, alerts: Vec<Alert>) {
+    let Ok(to) = destination::<Webhook>(&hook) else {
+        return;
+    };
+    let mut links = Vec::with_capacity(alerts.len());
+    for alert in &alerts {
+        links.push(link::of(&hook, alert).await);
+    }
+    let body = alertmanager::in_force(alerts.iter().zip(&links));
+    let (Ok(body), Some(first)) = (body, alerts.first()) else {
+        return;
+    };
+    let outcome = post(to, first, body, hook.timeout).await;
+    if outcome == HookOutcome::Done {
+        tracing::debug!(webhook = to.name, alerts = alerts.len(), "sent again");
+    } else {
+        tracing::warn!(
+            webhook = to.name,
+            alerts = alerts.len(),
+            ?outcome,
+            "what is in force could not be sent again"
+        );
+    }
 }
 
 /// Sends `alert`, whose JSON is `body`, within `limit`.

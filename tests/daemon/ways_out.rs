@@ -36,6 +36,7 @@ static SIREN: WayOut = WayOut {
             }
         })
     },
+    repeat: None,
     ready: |hook| {
         let siren: &Siren = destination(hook)?;
         Ok(format!("circuit {} is closed", siren.circuit))

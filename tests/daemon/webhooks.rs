@@ -444,6 +444,42 @@ async fn alertmanager_gets_a_list_with_the_same_labels_when_an_alert_fires_and_w
 }
 
 #[tokio::test]
+async fn what_alertmanager_has_taken_is_sent_to_it_again_each_minute_for_as_long_as_it_is_in_force()
+{
+    let folder = tempfile::tempdir().unwrap();
+    let receiver = Receiver::answering(&[200]);
+    let table = format!(
+        "[[webhook]]\nurl = \"{}\"\nformat = \"alertmanager\"\n",
+        receiver.url
+    );
+    let hooks = webhooks(folder.path(), &table);
+    let mut dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::default());
+    let (taken, other) = (alert("5", KEY), alert("6", "6/red/2017-06-06T17:00:00Z"));
+    dispatcher.offer(&taken);
+    eventually("that it is taken", || receiver.got().len() == 1).await;
+    for round in 2..4 {
+        // Before a minute has gone nothing is.
+        dispatcher.repeat(|| Box::new([&taken, &other].into_iter()));
+        tokio::time::pause();
+        tokio::time::advance(Duration::from_secs(61)).await;
+        tokio::time::resume();
+        dispatcher.repeat(|| Box::new([&taken, &other].into_iter()));
+        eventually("that it is sent again", || receiver.got().len() == round).await;
+        // The answer is read before the next one is due.
+        tokio::time::sleep(Duration::from_millis(200)).await;
+    }
+    let bodies = receiver.got();
+    let bodies = bodies.iter().map(|one| serde_json::from_str(&one.body));
+    let bodies: Vec<serde_json::Value> = bodies.map(Result::unwrap).collect();
+    assert_eq!(
+        bodies[1], bodies[0],
+        "the same, and not what it has not taken"
+    );
+    assert_eq!(bodies[2], bodies[0]);
+    assert_eq!(dispatcher.close(Duration::from_secs(5)).await, Some(0));
+}
+
+#[tokio::test]
 async fn the_end_of_a_red_that_alertmanager_did_not_take_comes_after_the_next_red_too() {
     let folder = tempfile::tempdir().unwrap();
     let receiver = Receiver::answering(&[200, 503, 200]);

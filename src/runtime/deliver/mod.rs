@@ -9,6 +9,7 @@
 mod at_once;
 mod changed;
 mod order;
+mod repeat;
 mod runner;
 mod running;
 mod shares;
@@ -25,6 +26,7 @@ use crate::config::HookConfig;
 use crate::monitor::EventKind;
 use crate::reading::BenchmarkId;
 use crate::store::DeliveryOutcome;
+use repeat::Repetition;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -133,6 +135,7 @@ pub struct Dispatcher {
     delivered: Arc<Mutex<Delivered>>,
     runner: Arc<dyn Runner>,
     retry: Retry,
+    repetition: Repetition,
 }
 
 impl Dispatcher {
@@ -156,6 +159,7 @@ impl Dispatcher {
             delivered: Arc::new(Mutex::new(delivered)),
             runner: Arc::clone(runner),
             retry: retry.clone(),
+            repetition: Repetition::new(),
         };
         started.hooks = hooks.iter().map(|hook| started.begin(hook, None)).collect();
         started

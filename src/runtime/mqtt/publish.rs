@@ -22,6 +22,7 @@ const REQUESTS: usize = 2;
 pub(in crate::runtime) static MQTT_OUT: WayOut = WayOut {
     table: "mqtt_out",
     send: |delivery| Box::pin(send(delivery)),
+    repeat: None,
     ready: |hook| {
         let topic: &MqttTopic = destination(hook)?;
         let name = &topic.name;

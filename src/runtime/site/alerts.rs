@@ -67,7 +67,18 @@ impl Site {
         }
         self.mutes.start(host_time);
         self.mute_what_is_in_hand(host_time);
+        self.repeat_what_is_in_force();
         self.record_and_send(&to_send)
+    }
+
+    fn repeat_what_is_in_force(&mut self) {
+        let standing = &self.standing;
+        if let Some(alerts) = &mut self.sinks.alerts {
+            alerts.repeat(|| {
+                let floods = standing.floods().map(|flood| &flood.alert);
+                Box::new(standing.all().map(|one| &one.alert).chain(floods))
+            });
+        }
     }
 
     fn record_and_send(&mut self, alerts: &[Alert]) -> Result<(), StoreError> {
