@@ -10,6 +10,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
+/// Of one attempt, where the config states none.
 const TIMEOUT: Duration = Duration::from_secs(10);
 /// An attempt that may take longer than this keeps those after it waiting.
 const LONG_TIMEOUT: SignedDuration = SignedDuration::from_mins(15);

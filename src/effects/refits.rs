@@ -38,6 +38,7 @@ enum Stride {
     Within(f64),
 }
 
+/// From the longest to the shortest: each is tried until it gains nothing more.
 const STRIDES: [Stride; 4] = [
     Stride::Coarse,
     Stride::Fine,

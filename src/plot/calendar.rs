@@ -118,6 +118,7 @@ impl CalendarStep {
     }
 }
 
+/// From which months and minutes are counted.
 const EPOCH: Date = date(1970, 1, 1);
 
 /// The first day of the month that is so many months after January 1970, and its day since then.

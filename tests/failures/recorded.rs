@@ -2,10 +2,12 @@
 
 use crate::site::{Program, Site, command, eventually, get, has_own_mounts};
 use serde_json::Value;
+use slipwatch::runtime::clock::Stopwatch;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
+use std::time::Duration;
 
 /// Hourly readings that run away, the last of them as these tests began.
 fn failing(rows: std::ops::Range<i32>) -> String {
@@ -96,14 +98,19 @@ fn health(address: &str) -> Value {
     serde_json::from_str(body.trim()).unwrap()
 }
 
-/// Waits until all that the state has stands in the record.
+/// Waits until all that the state has stands in the record, and the past has been judged: nothing has come to it for a second.
 fn recorded(site: &Site, address: &str, values: usize) {
     eventually("that it is taken", || site.values().len() == values);
+    let (mut before, mut since) = (None, Stopwatch::start());
     eventually("that all is recorded", || {
         let store = slipwatch::store::Store::look(&site.path("state")).unwrap();
+        let now = Some((store.last_step(), store.last_event()));
+        if before != now {
+            (before, since) = (now, Stopwatch::start());
+        }
         let record = &health(address)["record"];
-        (record["step"].as_i64(), record["event"].as_i64())
-            == (Some(store.last_step()), Some(store.last_event()))
+        record["step"].as_i64().zip(record["event"].as_i64()) == now
+            && since.elapsed() >= Duration::from_secs(1)
     });
 }
 

@@ -366,3 +366,24 @@ fn a_clock_that_is_set_back_by_less_than_counts_as_wrong_prolongs_no_silence() {
     });
     program.stop();
 }
+
+/// All of an upload counts, whose newest reading comes first and lies a quarter of an hour ahead.
+#[test]
+fn an_upload_that_begins_with_its_newest_reading_is_no_logger_that_was_set_right() {
+    let site = Site::new("[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"50 mm\"\n");
+    let begin = clock::now() + SignedDuration::from_mins(15);
+    let row = |back: i64, value: f64| {
+        let time = begin - SignedDuration::from_mins(10 * back);
+        format!("{time},{value:.3}\n")
+    };
+    let creep: String = (6..60).rev().map(|back| row(back, 0.001)).collect();
+    site.append("incoming/5.csv", &format!("{HEADER}{creep}"));
+    let program = site.caught_up();
+    for (taken, back) in (55..).zip(0..6) {
+        site.append("incoming/5.csv", &row(back, 100.0 - back as f64));
+        eventually("it", || site.values().len() == taken);
+    }
+    program.stop();
+    let events = site.proven_events();
+    assert!(!events.contains("clock-set-back"), "{events}");
+}

@@ -26,6 +26,7 @@ use rand_pcg::Pcg64;
 /// slow down, and m a little above 1 next to m a little below.
 pub(super) type Point = SVector<f64, 7>;
 
+/// Where each of them stands in a [`Point`].
 pub(super) const P: usize = 0;
 pub(super) const CURVATURE: usize = 1;
 pub(super) const SLOPE: usize = 2;

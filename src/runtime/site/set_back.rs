@@ -16,8 +16,9 @@ const BEFORE: SignedDuration = SignedDuration::from_mins(1);
 /// So many in a row say so: one may come from a buffer.
 const AGREEING: u32 = 3;
 
-/// Of each benchmark, how many readings in a row agree with the host's clock though later ones are known.
-pub(super) type Agreeing = BTreeMap<BenchmarkId, u32>;
+/// Of each benchmark, how many readings in a row agree with the host's clock though later ones are known, and the time of the last of
+/// them. Each goes forward in time: of an upload whose newest reading comes first, each lies before the last.
+pub(super) type Agreeing = BTreeMap<BenchmarkId, (u32, Timestamp)>;
 
 impl Site {
     /// After a reading that was taken when the host's clock said `host_time`: where it is the third in a row that agrees with that clock, while readings are
@@ -33,8 +34,10 @@ impl Site {
             self.agreeing.remove(benchmark);
             return Vec::new();
         }
-        let count = self.agreeing.entry(benchmark.clone()).or_default();
-        *count = count.saturating_add(1);
+        let (count, last) = (self.agreeing.entry(benchmark.clone())).or_insert((0, arrival.time));
+        let goes_on = *count == 0 || arrival.time > *last;
+        *count = if goes_on { count.saturating_add(1) } else { 1 };
+        *last = arrival.time;
         if *count != AGREEING {
             return Vec::new();
         }

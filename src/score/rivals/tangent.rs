@@ -15,6 +15,7 @@ use crate::fit::Rate;
 use crate::forecast::Passage;
 use crate::score::Known;
 
+/// The angle of uniform creep, by the definition of the figure, and that of imminent failure, which its authors give.
 const UNIFORM_DEGREES: f64 = 45.0;
 const IMMINENT_DEGREES: f64 = 85.0;
 
