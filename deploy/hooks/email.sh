@@ -2,9 +2,14 @@
 # Hook: an e-mail through the machine's own sendmail.
 #   run = ["/etc/slipwatch/hooks/email.sh", "duty@example.org", "office@example.org"]
 # The alert's JSON is attached to the text, so that whoever gets it has every figure. A mailer that needs its setgid bit (Postfix,
-# Exim) also needs sandbox = false. Another mailer: SENDMAIL=/path/to/program, which takes -t -i. Exits as the mailer does, so
-# that the daemon tries again where it fails.
+# Exim) also needs sandbox = false. Another mailer, which takes -t -i: ["/etc/slipwatch/hooks/email.sh", "--mailer", "/usr/bin/msmtp",
+# "duty@example.org"]. Exits as the mailer does, so that the daemon tries again where it fails.
 set -eu
+mailer=${SENDMAIL:-/usr/sbin/sendmail}
+if [ "${1:-}" = --mailer ] && [ $# -ge 2 ]; then
+    mailer=$2
+    shift 2
+fi
 if [ $# -eq 0 ]; then
     echo "email.sh: name at least one address" >&2
     exit 2
@@ -18,12 +23,19 @@ if [ "${SLIPWATCH_COUNT:-1}" -gt 1 ]; then
     place="$SLIPWATCH_COUNT benchmarks"
 fi
 site=$(plain "$SLIPWATCH_SITE")
+# A header holds ASCII alone (RFC 2047).
+encoded() {
+    case $1 in
+    *[!\ -~]*) printf '=?UTF-8?B?%s?=' "$(printf '%s' "$1" | base64 | tr -d '\n')" ;;
+    *) printf '%s' "$1" ;;
+    esac
+}
 {
     printf 'To: %s\n' "${recipients%, }"
-    printf 'Subject: [%s] %s: %s %s at %s\n' "$SLIPWATCH_STATUS" "$site" "$SLIPWATCH_LEVEL" "$SLIPWATCH_STATE" "$place"
+    printf 'Subject: %s\n' "$(encoded "[$SLIPWATCH_STATUS] $site: $SLIPWATCH_LEVEL $SLIPWATCH_STATE at $place")"
     printf 'MIME-Version: 1.0\nContent-Type: text/plain; charset=utf-8\nContent-Transfer-Encoding: 8bit\n'
     # The same at each attempt: a mail program shows a repetition as what it is.
-    printf 'X-Slipwatch-Key: %s\n\n' "$(plain "$SLIPWATCH_KEY")"
+    printf 'X-Slipwatch-Key: %s\n\n' "$(encoded "$(plain "$SLIPWATCH_KEY")")"
     printf '%s: %s (%s) at %s since %s\n' "$site" "$SLIPWATCH_LEVEL" "$SLIPWATCH_STATE" "$place" "$SLIPWATCH_TIME"
     if [ -n "${SLIPWATCH_FAILURE_TIME:-}" ]; then
         printf 'median forecast of the collapse: %s\n' "$SLIPWATCH_FAILURE_TIME"
@@ -32,5 +44,6 @@ site=$(plain "$SLIPWATCH_SITE")
         printf 'acknowledge it, once: %s\n' "$(plain "$SLIPWATCH_ACKNOWLEDGE_URL")"
     fi
     printf 'attempt %s, key %s\n\n' "$SLIPWATCH_ATTEMPT" "$(plain "$SLIPWATCH_KEY")"
-    cat
-} | "${SENDMAIL:-/usr/sbin/sendmail}" -t -i
+    # A mailer may refuse a line of more than 998 octets (RFC 5322): Exim bounces it after it has taken the message.
+    sed 's/,"/,\n"/g' | fold -b -s -w 900
+} | "$mailer" -t -i

@@ -20,6 +20,13 @@ place=$(plain "${SLIPWATCH_BENCHMARK:-(site)}")
 if [ "${SLIPWATCH_COUNT:-1}" -gt 1 ]; then
     place="$SLIPWATCH_COUNT benchmarks"
 fi
+# A header holds ASCII alone (RFC 2047).
+encoded() {
+    case $1 in
+    *[!\ -~]*) printf '=?UTF-8?B?%s?=' "$(printf '%s' "$1" | base64 | tr -d '\n')" ;;
+    *) printf '%s' "$1" ;;
+    esac
+}
 title="[$SLIPWATCH_STATUS] $(plain "$SLIPWATCH_SITE"): $SLIPWATCH_LEVEL $SLIPWATCH_STATE"
 text="$place, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+; median forecast of the collapse $SLIPWATCH_FAILURE_TIME}${SLIPWATCH_TEXT:+. $SLIPWATCH_TEXT}"
 token_file="$(dirname "$0")/ntfy.token"
@@ -27,5 +34,5 @@ if [ -r "$token_file" ]; then
     # Over standard input: the command line can be read by everyone on the machine.
     printf 'header = "Authorization: Bearer %s"\n' "$(tr -d '\r\n' <"$token_file")"
 fi | curl --config - --fail --silent --show-error --max-time 8 --output /dev/null \
-    --header "Title: $title" --header "Priority: $priority" --header "Tags: slipwatch,$SLIPWATCH_LEVEL" \
+    --header "Title: $(encoded "$title")" --header "Priority: $priority" --header "Tags: slipwatch,$SLIPWATCH_LEVEL" \
     --data-raw "$text" "$1"

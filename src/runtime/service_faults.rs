@@ -222,7 +222,30 @@ pub fn faults_in(state_dir: &Path) -> Vec<ServiceFault> {
         Ok(serde_json::from_str(&text)?)
     };
     // There is none before a daemon has run.
-    read().unwrap_or_default()
+    let mut all = read().unwrap_or_default();
+    all.extend(read_only(state_dir));
+    all
+}
+
+/// That the file in which a daemon says what it meets lies on a file system that is read-only: it cannot say that itself.
+fn read_only(state_dir: &Path) -> Option<ServiceFault> {
+    let path = state_dir.join(FILE);
+    let opened = File::options().write(true).open(&path);
+    opened
+        .err()
+        .filter(|error| error.kind() == io::ErrorKind::ReadOnlyFilesystem)?;
+    let written = path.metadata().and_then(|file| file.modified());
+    let written = written.ok().and_then(|time| Timestamp::try_from(time).ok());
+    Some(ServiceFault {
+        kind: ServiceFaultKind::StateUnwritable,
+        source: None,
+        text: format!(
+            "{} lies on a file system that is read-only here: what is shown may be old, a level in force may be missing, and no order can be left. \
+             Whether the daemon can write it is said by its log, its /readyz and its hooks",
+            state_dir.display()
+        ),
+        since: written.unwrap_or_else(clock::now),
+    })
 }
 
 /// Writes them over what was there.

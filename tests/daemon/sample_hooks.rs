@@ -16,11 +16,17 @@ type Said<'a> = (&'a str, &'a str, &'a str);
 const RED: Said<'_> = ("red", "firing", "Actual");
 
 /// Runs one with the environment and the input that the daemon gives it.
-fn run(
+fn run(name: &str, arguments: &[&str], said: Said<'_>, more: &[(&str, &Path)]) -> Output {
+    let input = r#"{"event": "alert", "text": "benchmark 5: red"}"#;
+    run_with(name, arguments, said, (more, input))
+}
+
+/// The same with what it gets on stdin.
+fn run_with(
     name: &str,
     arguments: &[&str],
     (level, state, status): Said<'_>,
-    more: &[(&str, &Path)],
+    (more, given): (&[(&str, &Path)], &str),
 ) -> Output {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut command = Command::new(root.join("deploy/hooks").join(name));
@@ -46,7 +52,7 @@ fn run(
     let mut child = command.spawn().unwrap();
     let mut input = child.stdin.take().unwrap();
     // One that leaves at once has no use for it.
-    let _ = input.write_all(br#"{"event": "alert", "text": "benchmark 5: red"}"#);
+    let _ = input.write_all(given.as_bytes());
     drop(input);
     child.wait_with_output().unwrap()
 }
@@ -93,6 +99,37 @@ fn an_email_goes_to_each_address_with_the_alert_in_it_and_no_name_forges_a_heade
     let output = run("email.sh", &to, RED, &[("SENDMAIL", &failing)]);
     assert_eq!(output.status.code(), Some(75), "the daemon tries again");
     assert_eq!(run("email.sh", &[], RED, &[]).status.code(), Some(2));
+}
+
+/// Exim takes a message with a longer line, and bounces it.
+#[test]
+fn an_email_has_no_line_that_a_mailer_refuses_and_only_ascii_in_its_head() {
+    let folder = tempfile::tempdir().unwrap();
+    let mail = folder.path().join("mail");
+    let mailer = program(
+        folder.path(),
+        &format!("#!/bin/sh\ncat > {}\n", mail.display()),
+    );
+    let fields: Vec<String> = (0..100)
+        .map(|field| format!("\"field{field}\":\"value\""))
+        .collect();
+    let given = format!(
+        "{{{},\"text\":\"{}\"}}",
+        fields.join(","),
+        "benchmark ".repeat(400)
+    );
+    let to = ["--mailer", mailer.to_str().unwrap(), "duty@example.org"];
+    let site = [("SLIPWATCH_SITE", Path::new("La Clapi\u{e8}re"))];
+    let output = run_with("email.sh", &to, RED, (&site, &given));
+    assert!(output.status.success(), "{output:?}");
+    let mail = fs::read_to_string(mail).unwrap();
+    let longest = mail.lines().map(str::len).max();
+    assert!(longest <= Some(998), "{longest:?}");
+    let (head, body) = mail.split_once("\n\n").unwrap();
+    assert!(head.is_ascii(), "{head}");
+    assert!(head.contains("Subject: =?UTF-8?B?"), "{head}");
+    assert!(body.contains("La Clapi\u{e8}re: red (firing)"), "{body}");
+    assert!(body.contains("\"field7\":\"value\",\n\"field8\""), "{body}");
 }
 
 /// Answers one request with a status; gives its address and what it got.

@@ -241,6 +241,40 @@ fn a_bit_that_flips_while_the_daemon_runs_is_reported() {
     not(has_own_mounts),
     ignore = "a process may not have mounts of its own here"
 )]
+fn a_file_system_that_becomes_read_only_under_the_daemon_is_said_to_be() {
+    if !has_own_mounts(
+        "database::a_file_system_that_becomes_read_only_under_the_daemon_is_said_to_be",
+    ) {
+        return;
+    }
+    let site = used();
+    let state = site.path("state");
+    let folder = state.to_str().unwrap();
+    // It has its files open on the file system beneath.
+    let program = site.caught_up();
+    command(&["mount", "--bind", folder, folder]);
+    command(&["mount", "-o", "remount,bind,ro", folder]);
+    // While the daemon runs, what there is is shown.
+    let status = site.printed(&["status", "--config", "site.toml"]);
+    let status = status.replace("\n    ", " ");
+    assert!(
+        status.contains("FAULT since") && status.contains("read-only here"),
+        "{status}"
+    );
+    let order = site.ask(&["alerts", "ack", "--config", "site.toml"]);
+    let said = String::from_utf8_lossy(&order.stderr);
+    assert!(
+        !order.status.success() && said.contains("no order can be left"),
+        "{said}"
+    );
+    program.stop();
+}
+
+#[test]
+#[cfg_attr(
+    not(has_own_mounts),
+    ignore = "a process may not have mounts of its own here"
+)]
 fn a_state_on_a_read_only_file_system_is_said_to_be_there() {
     if !has_own_mounts("database::a_state_on_a_read_only_file_system_is_said_to_be_there") {
         return;

@@ -44,6 +44,25 @@ fn a_row_that_is_ended_only_by_the_next_one_is_read_where_three_before_it_were_a
     assert!(!site.events().contains("quarantined"), "{}", site.events());
 }
 
+/// As at a daily rotation.
+#[test]
+fn the_first_rows_of_a_new_file_are_not_waited_for_where_the_one_before_it_was_written_so() {
+    let site = Site::new("");
+    site.append("incoming/5.csv", HEADER.trim_end());
+    let program = site.caught_up();
+    for day in 1..6 {
+        site.append("incoming/5.csv", &format!("\n{}", row(day).trim_end()));
+        let before = day as usize - 1;
+        eventually("the row before it", || site.values().len() >= before);
+    }
+    eventually("the last one", || site.values().len() == 5);
+    fs::rename(site.path("incoming/5.csv"), site.path("5.old")).unwrap();
+    let first = format!("{}\n{}", HEADER.trim_end(), row(6).trim_end());
+    site.append("incoming/5.csv", &first);
+    eventually("the first of the next file", || site.values().len() == 6);
+    program.stop();
+}
+
 /// 1. While it runs, and while it does not.
 #[test]
 fn a_file_copied_and_truncated_is_read_again_and_a_possible_gap_is_said_once_each() {

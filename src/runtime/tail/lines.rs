@@ -56,6 +56,19 @@ pub struct Lines {
 }
 
 impl Lines {
+    /// Of a text whose writer is known to end each line only before the next one, where that `is_known`.
+    pub fn ended_later(is_known: bool) -> Self {
+        Self {
+            ended_later: if is_known { ENDED_LATER } else { 0 },
+            ..Self::default()
+        }
+    }
+
+    /// Whether the writer has been seen to end each line only before the next one.
+    pub fn are_ended_later(&self) -> bool {
+        self.ended_later >= ENDED_LATER
+    }
+
     /// Takes the next bytes of the file and returns the lines that they complete.
     pub fn feed(&mut self, bytes: &[u8]) -> Vec<TailLine> {
         if self.number > 0 || !self.partial.is_empty() {
@@ -100,7 +113,7 @@ impl Lines {
     /// The line that is held, where it is whole although no newline follows it: whoever writes ends each line only before the next one, and has
     /// written nothing for some time.
     pub fn unended(&mut self) -> Option<TailLine> {
-        if self.ended_later < ENDED_LATER || self.is_returned || self.partial.is_empty() {
+        if !self.are_ended_later() || self.is_returned || self.partial.is_empty() {
             return None;
         }
         let held = self.partial.clone();

@@ -48,6 +48,13 @@ impl Follower {
             .filter(|((source, _), one)| *source == key.0 && one.origin == key.1);
         let latest = before.max_by_key(|(_, one)| one.modified);
         file.header_before = latest.map(|(_, one)| one.header()).unwrap_or_default();
+        let of_source = (self.files.iter()).filter(|((source, _), _)| *source == key.0);
+        let newest = of_source.max_by_key(|(_, one)| one.modified);
+        if let (Content::Text(text), Some((_, newest))) = (&mut file.content, newest) {
+            let is_known =
+                matches!(&newest.content, Content::Text(text) if text.has_lines_ended_later());
+            text.ends_lines_later(is_known);
+        }
         file
     }
 }

@@ -77,6 +77,18 @@ impl TextReader {
         }
     }
 
+    /// A text whose writer has ended the lines of another one only before the next line, where it has: so it will here.
+    pub(super) fn ends_lines_later(&mut self, is_known: bool) {
+        if self.lines == Lines::default() {
+            self.lines = Lines::ended_later(is_known);
+        }
+    }
+
+    /// Whether its writer ends each line only before the next one.
+    pub(super) fn has_lines_ended_later(&self) -> bool {
+        self.lines.are_ended_later()
+    }
+
     /// A reader of a text that goes on below these lines of a header, which stand in another file.
     pub(super) fn below(mut rows: TextRows, header: &[String]) -> Option<Self> {
         take_header(&mut rows, header).ok()?;
