@@ -8,6 +8,8 @@
 # of another's red changes nothing. Another level, an unknown or a drill (a status other than Actual) changes nothing either. With --drills
 # after the file drills switch it too. Without site = true it is switched on by each benchmark's red, and off only with --one-benchmark, for
 # a site that has no other; else the end is refused, and stands in the daemon's log. The file must be writable for the daemon's user.
+# The packaged unit may not write there. `systemctl edit slipwatch`: [Service], ProtectKernelTunables=no, ReadWritePaths=/sys/class/leds/relay1.
+# `slipwatch hook test` runs outside the unit and does not show whether that is right; a [drill] with this hook does.
 set -eu
 if [ $# -lt 1 ]; then
     echo "relay.sh: name the file of the relay" >&2

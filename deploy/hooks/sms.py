@@ -6,9 +6,21 @@
     timeout = "60s"
 
 Needs Python's standard library alone. The daemon's user must be in the modem's group (dialout). One message to each
-number; exits 1 where the modem refuses one or does not answer, and the daemon tries again.
+number; exits 1 where the modem refuses one or does not answer, and the daemon tries again. Several benchmarks may be red
+at once: each run waits for the ones before it, so the timeout must allow for several.
+
+The packaged unit has no devices. `systemctl edit slipwatch`:
+
+    [Service]
+    PrivateDevices=no
+    PrivateUsers=no
+    DeviceAllow=/dev/ttyUSB0 rw
+    SupplementaryGroups=dialout
+
+`slipwatch hook test` runs outside the unit and does not show whether that is right; a [drill] with this hook does.
 """
 
+import fcntl
 import json
 import os
 import sys
@@ -47,6 +59,8 @@ def command(modem, text, wanted):
 
 def opened(path):
     modem = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    # One at a time: commands of two runs would mix. The kernel ends it with the process.
+    fcntl.flock(modem, fcntl.LOCK_EX)
     tty.setraw(modem)
     settings = termios.tcgetattr(modem)
     # A read returns after a second at the latest.

@@ -59,11 +59,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 /// messages that wait for an answer are not to take what a hook needs.
 fn allow_files() {
     let raised = getrlimit(Resource::RLIMIT_NOFILE).and_then(|(soft, hard)| {
-        setrlimit(
-            Resource::RLIMIT_NOFILE,
-            soft.max(hard.min(MOST_FILES)),
-            hard,
-        )
+        let wanted = hard.min(MOST_FILES);
+        if soft >= wanted {
+            return Ok(());
+        }
+        setrlimit(Resource::RLIMIT_NOFILE, wanted, hard)
     });
     if let Err(error) = raised {
         tracing::warn!(%error, "the limit of open files stays as it is");

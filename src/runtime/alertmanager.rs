@@ -19,9 +19,29 @@ pub(super) fn body(
     levels: &[Level],
     link: Option<&str>,
 ) -> Result<Vec<u8>, serde_json::Error> {
+    serde_json::to_vec(&entries(alert, levels, link))
+}
+
+/// A list of alerts that were sent before, with their links: those in force, and such as have ended of late.
+pub(super) fn again<'a>(
+    alerts: impl Iterator<Item = (&'a Alert, &'a Option<String>)>,
+    levels: &[Level],
+) -> Result<Vec<u8>, serde_json::Error> {
+    let all = alerts.flat_map(|(alert, link)| {
+        let mut entries = entries(alert, levels, link.as_deref());
+        if alert.state == MessageState::Firing {
+            // What it superseded has ended at it before.
+            entries.truncate(1);
+        }
+        entries
+    });
+    serde_json::to_vec(&all.collect::<Vec<_>>())
+}
+
+fn entries(alert: &Alert, levels: &[Level], link: Option<&str>) -> Vec<serde_json::Value> {
     let time = alert.event.time;
     let lasts = match alert.state {
-        MessageState::Firing => without_end(alert),
+        MessageState::Firing => TimeSpan::new(time, time.checked_add(STANDS_FOR).unwrap_or(time)),
         MessageState::Resolved | MessageState::Correction => {
             let called = alert.called.or_else(|| since(&alert.key)).unwrap_or(time);
             TimeSpan::new(called.min(time), time)
@@ -44,27 +64,7 @@ pub(super) fn body(
             None,
         ));
     }
-    serde_json::to_vec(&all)
-}
-
-/// A list of alerts in force with their links, as they were sent before.
-pub(super) fn in_force<'a>(
-    alerts: impl Iterator<Item = (&'a Alert, &'a Option<String>)>,
-) -> Result<Vec<u8>, serde_json::Error> {
-    let all = alerts.map(|(alert, link)| {
-        let own = (
-            alert.event.benchmark.as_ref(),
-            alert.level,
-            alert.key.as_str(),
-        );
-        entry(alert, own, without_end(alert), link.as_deref())
-    });
-    serde_json::to_vec(&all.collect::<Vec<_>>())
-}
-
-fn without_end(alert: &Alert) -> TimeSpan {
-    let time = alert.event.time;
-    TimeSpan::new(time, time.checked_add(STANDS_FOR).unwrap_or(time))
+    all
 }
 
 /// An alert by its benchmark, level and key, with what `alert` says.

@@ -83,7 +83,7 @@ async fn send(delivery: DeliveryAttempt) -> HookOutcome {
     outcome
 }
 
-/// Sends what is in force once more to Alertmanager, in one message.
+/// Sends what is in force, or has ended of late, once more to Alertmanager, in one message.
 async fn repeat(hook: Arc<HookConfig>, alerts: Vec<Alert>) {
     let Ok(to) = destination::<Webhook>(&hook) else {
         return;
@@ -92,7 +92,7 @@ async fn repeat(hook: Arc<HookConfig>, alerts: Vec<Alert>) {
     for alert in &alerts {
         links.push(link::of(&hook, alert).await);
     }
-    let body = alertmanager::in_force(alerts.iter().zip(&links));
+    let body = alertmanager::again(alerts.iter().zip(&links), &hook.levels);
     let (Ok(body), Some(first)) = (body, alerts.first()) else {
         return;
     };

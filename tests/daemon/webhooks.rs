@@ -453,7 +453,7 @@ async fn what_alertmanager_has_taken_is_sent_to_it_again_each_minute_for_as_long
         receiver.url
     );
     let hooks = webhooks(folder.path(), &table);
-    let mut dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::default());
+    let dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::default());
     let (taken, other) = (alert("5", KEY), alert("6", "6/red/2017-06-06T17:00:00Z"));
     dispatcher.offer(&taken);
     eventually("that it is taken", || receiver.got().len() == 1).await;
@@ -476,6 +476,18 @@ async fn what_alertmanager_has_taken_is_sent_to_it_again_each_minute_for_as_long
         "the same, and not what it has not taken"
     );
     assert_eq!(bodies[2], bodies[0]);
+    // A repetition that was under way may have come after the end.
+    let end = ended(taken.clone(), "2017-06-09T05:00:00Z");
+    dispatcher.offer(&end);
+    eventually("that the end is taken", || receiver.got().len() == 4).await;
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    tokio::time::pause();
+    tokio::time::advance(Duration::from_secs(61)).await;
+    tokio::time::resume();
+    dispatcher.repeat(|| Box::new(std::iter::empty()));
+    eventually("that the end is sent again", || receiver.got().len() == 5).await;
+    let got = receiver.got();
+    assert_eq!(got[4].body, got[3].body);
     assert_eq!(dispatcher.close(Duration::from_secs(5)).await, Some(0));
 }
 

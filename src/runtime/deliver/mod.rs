@@ -135,7 +135,7 @@ pub struct Dispatcher {
     delivered: Arc<Mutex<Delivered>>,
     runner: Arc<dyn Runner>,
     retry: Retry,
-    repetition: Repetition,
+    repetition: Mutex<Repetition>,
 }
 
 impl Dispatcher {
@@ -159,7 +159,7 @@ impl Dispatcher {
             delivered: Arc::new(Mutex::new(delivered)),
             runner: Arc::clone(runner),
             retry: retry.clone(),
-            repetition: Repetition::new(),
+            repetition: Mutex::new(Repetition::new()),
         };
         started.hooks = hooks.iter().map(|hook| started.begin(hook, None)).collect();
         started
@@ -355,6 +355,9 @@ impl Dispatcher {
 
     fn offer_to(&self, way: &HookQueue, alert: &Alert, is_muted: bool) -> bool {
         let (name, key) = (way.hook.name(), &alert.key);
+        if way.hook.to.as_ref().is_some_and(|to| to.forgets()) {
+            locked(&self.repetition).note(alert);
+        }
         // Queued first: a worker notes the receipt before it lets go.
         let mut queued = locked(&way.queued);
         if self.ends_unreported(way, &mut queued, alert) {

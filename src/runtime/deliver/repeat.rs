@@ -1,10 +1,14 @@
 //! Sends again what is in force, to receivers that keep it in memory alone: Alertmanager forgets an alert when it is restarted.
+//!
+//! A repetition that is under way when its alert ends may arrive after the end, and would revive the alert there: what has ended of late is
+//! sent again with its end.
 
 use super::{Dispatcher, locked};
 use crate::runtime::clock::Stopwatch;
-use crate::runtime::hook::Alert;
+use crate::runtime::hook::{Alert, MessageState};
 use crate::runtime::ways_out::WAYS_OUT;
 use std::cmp::Reverse;
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::task::JoinSet;
@@ -14,11 +18,16 @@ const EACH: Duration = Duration::from_secs(60);
 /// Alerts that are sent again at most, the most severe of them.
 const MOST: usize = 1000;
 
+/// For so long what has ended is sent again: a repetition may take as long as a webhook's timeout.
+const ENDED_OF_LATE: Duration = Duration::from_secs(180);
+
 /// When that was done last, and what of it is still under way.
 #[derive(Debug)]
 pub(super) struct Repetition {
     since: Stopwatch,
     under_way: JoinSet<()>,
+    /// Ends of late, the oldest first.
+    ended: VecDeque<(Stopwatch, Alert)>,
 }
 
 impl Repetition {
@@ -26,7 +35,23 @@ impl Repetition {
         Self {
             since: Stopwatch::start(),
             under_way: JoinSet::new(),
+            ended: VecDeque::new(),
         }
+    }
+
+    /// Keeps the end of an alert for some time.
+    pub(super) fn note(&mut self, alert: &Alert) {
+        if alert.state == MessageState::Resolved {
+            self.ended.push_back((Stopwatch::start(), alert.clone()));
+            let excess = self.ended.len().saturating_sub(MOST);
+            self.ended.drain(..excess);
+        }
+    }
+
+    fn ended_of_late(&mut self) -> Vec<Alert> {
+        let is_late = |(since, _): &(Stopwatch, Alert)| since.elapsed() < ENDED_OF_LATE;
+        self.ended.retain(is_late);
+        self.ended.iter().map(|(_, alert)| alert.clone()).collect()
     }
 
     fn is_due(&mut self) -> bool {
@@ -41,11 +66,13 @@ impl Repetition {
 
 impl Dispatcher {
     /// Once a minute: has what is `in_force` sent again to those that forget it and have taken it before.
-    pub fn repeat<'a>(&mut self, in_force: impl Fn() -> Box<dyn Iterator<Item = &'a Alert> + 'a>) {
+    pub fn repeat<'a>(&self, in_force: impl Fn() -> Box<dyn Iterator<Item = &'a Alert> + 'a>) {
         let forgets = |way: &&super::HookQueue| way.hook.to.as_ref().is_some_and(|to| to.forgets());
-        if !self.hooks.iter().any(|way| forgets(&way)) || !self.repetition.is_due() {
+        let mut repetition = locked(&self.repetition);
+        if !self.hooks.iter().any(|way| forgets(&way)) || !repetition.is_due() {
             return;
         }
+        let ended = repetition.ended_of_late();
         for way in self.hooks.iter().filter(forgets) {
             let Some(repeat) = (WAYS_OUT.iter())
                 .find(|one| one.table == way.hook.table())
@@ -55,15 +82,15 @@ impl Dispatcher {
             };
             let name = way.hook.name();
             let delivered = locked(&self.delivered);
-            let mut alerts: Vec<Alert> = in_force()
-                .filter(|one| way.hook.asks_for(one) && delivered.was_notified(one, &name))
-                .cloned()
-                .collect();
+            let has_taken =
+                |one: &&Alert| way.hook.asks_for(one) && delivered.was_notified(one, &name);
+            let mut alerts: Vec<Alert> = in_force().filter(has_taken).cloned().collect();
+            alerts.extend(ended.iter().filter(has_taken).cloned());
             drop(delivered);
             alerts.sort_by_key(|one| Reverse(one.level));
             alerts.truncate(MOST);
             if !alerts.is_empty() {
-                self.repetition
+                repetition
                     .under_way
                     .spawn(repeat(Arc::clone(&way.hook), alerts));
             }

@@ -71,9 +71,9 @@ impl Site {
         self.record_and_send(&to_send)
     }
 
-    fn repeat_what_is_in_force(&mut self) {
+    fn repeat_what_is_in_force(&self) {
         let standing = &self.standing;
-        if let Some(alerts) = &mut self.sinks.alerts {
+        if let Some(alerts) = &self.sinks.alerts {
             alerts.repeat(|| {
                 let floods = standing.floods().map(|flood| &flood.alert);
                 Box::new(standing.all().map(|one| &one.alert).chain(floods))
