@@ -443,49 +443,57 @@ fn file_of(module: &[String], path: &[String], modules: &Modules) -> Option<Vec<
     (at.len() > start || path[0] == "super").then_some(at)
 }
 
-/// Pairs of files of one module of which each names the other; not what a folder's `mod.rs` has to do with the files
-/// in it.
-fn mutual(sources: &[Source]) -> Vec<String> {
-    let modules = Modules::of(sources);
-    let mut named: BTreeSet<(Vec<String>, Vec<String>)> = BTreeSet::new();
+/// A module and one that it names.
+type Named = (Vec<String>, Vec<String>);
+
+/// What the modules of `sources` name, as far as it `counts`.
+fn named<'a>(
+    modules: &Modules,
+    sources: impl Iterator<Item = &'a Source>,
+    counts: impl Fn(Named) -> Option<Named>,
+) -> BTreeSet<Named> {
+    let mut named = BTreeSet::new();
     for source in sources {
         for path in paths(&source.text) {
-            named.extend(
-                file_of(&source.module, &path, &modules).map(|to| (source.module.clone(), to)),
-            );
+            let to = file_of(&source.module, &path, modules);
+            named.extend(to.and_then(|to| counts((source.module.clone(), to))));
         }
     }
-    let apart = |a: &[String], b: &[String]| !a.starts_with(b) && !b.starts_with(a);
-    let both = named.iter().filter(|(a, b)| {
-        let alike = !a.is_empty() && a.first() == b.first();
-        a < b && alike && apart(a, b) && named.contains(&(b.clone(), a.clone()))
-    });
+    named
+}
+
+/// Those pairs of which each names the other.
+fn both_ways(named: &BTreeSet<Named>) -> Vec<String> {
+    let both = named
+        .iter()
+        .filter(|(a, b)| a < b && named.contains(&(b.clone(), a.clone())));
     both.map(|(a, b)| format!("{} and {}", a.join("/"), b.join("/")))
         .collect()
 }
 
+/// Pairs of files of one module of which each names the other; not what a folder's `mod.rs` has to do with the files
+/// in it.
+fn mutual(sources: &[Source]) -> Vec<String> {
+    let of_one = |(a, b): Named| {
+        let alike = !a.is_empty() && a.first() == b.first();
+        let apart = !a.starts_with(&b) && !b.starts_with(&a);
+        (alike && apart).then_some((a, b))
+    };
+    both_ways(&named(&Modules::of(sources), sources.iter(), of_one))
+}
+
 /// Folders of one module, and files beside them, of which each names something in the other.
 fn mutual_folders(sources: &[Source]) -> Vec<String> {
-    let modules = Modules::of(sources);
-    let mut named: BTreeSet<(Vec<String>, Vec<String>)> = BTreeSet::new();
     let of_tests = |source: &&Source| {
         let last = source.module.last().map(String::as_str);
         matches!(last, Some("tests" | "fixture"))
     };
-    for source in sources
-        .iter()
-        .filter(|one| one.module.len() > 1 && !of_tests(one))
-    {
-        let places = paths(&source.text);
-        let places = places
-            .iter()
-            .filter_map(|path| file_of(&source.module, path, &modules));
-        let others = places.filter(|to| to.len() > 1 && to[0] == source.module[0]);
-        named.extend(others.map(|to| (source.module[..2].to_vec(), to[..2].to_vec())));
-    }
-    let both = (named.iter()).filter(|(a, b)| a < b && named.contains(&(b.clone(), a.clone())));
-    both.map(|(a, b)| format!("{} and {}", a.join("/"), b.join("/")))
-        .collect()
+    let product = sources.iter().filter(|source| !of_tests(source));
+    let second_level = |(a, b): Named| {
+        let is_within = a.len() > 1 && b.len() > 1 && a[0] == b[0];
+        is_within.then(|| (a[..2].to_vec(), b[..2].to_vec()))
+    };
+    both_ways(&named(&Modules::of(sources), product, second_level))
 }
 
 #[test]

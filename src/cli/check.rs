@@ -126,15 +126,14 @@ fn all_are_fed(config: &Path, preview: &Preview) -> anyhow::Result<()> {
     if preview.without_readings.is_empty() {
         return Ok(());
     }
-    let what =
-        preview
-            .without_readings
-            .iter()
-            .map(|without_readings| match &without_readings.benchmark {
-                Some(benchmark) => format!("benchmark {:?}", benchmark.as_str()),
-                None if without_readings.source.is_empty() => "the site".to_owned(),
-                None => format!("source {:?}", without_readings.source),
-            });
+    let what = preview
+        .without_readings
+        .iter()
+        .map(|one| match &one.benchmark {
+            Some(benchmark) => format!("benchmark {:?}", benchmark.as_str()),
+            None if one.source.is_empty() => "the site".to_owned(),
+            None => format!("source {:?}", one.source),
+        });
     Err(Unwatched {
         config: config.to_owned(),
         what: what.collect(),

@@ -152,7 +152,8 @@ impl Search<'_> {
         }
     }
 
-    /// One step of Gauss and Newton in the delay (not the damped descent: each trial is itself a descent of law and gains), the start, the law and the gains; `None` where it does not help.
+    /// One step of Gauss and Newton in the delay, the start, the law and the gains; `None` where it does not help. Not the damped descent:
+    /// each trial is itself a descent of law and gains.
     fn toward_its_delay(&mut self, fitted: &Fitted, holds_shape: bool) -> Option<Fitted> {
         let term = fitted.terms.last()?;
         let response = term.response?;

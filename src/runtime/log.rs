@@ -15,7 +15,7 @@ const WAITING: usize = 4096;
 /// At the end: how long what waits may take to be written.
 const LAST_LINES: Duration = Duration::from_secs(1);
 
-/// So many values of a kind that are set aside are logged one by one; then each time their number has doubled.
+/// So many of what happens again and again are logged one by one; then each time their number has doubled.
 const LOGGED: u64 = 16;
 /// Lines that were not written.
 static LOST: AtomicU64 = AtomicU64::new(0);

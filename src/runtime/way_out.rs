@@ -9,7 +9,7 @@ use std::sync::Arc;
 pub type Run = Pin<Box<dyn Future<Output = HookOutcome> + Send>>;
 
 /// What sends alerts in force again, which is no attempt to deliver them.
-pub type Repeat = fn(Arc<HookConfig>, Vec<Alert>) -> Pin<Box<dyn Future<Output = ()> + Send>>;
+pub type Repeat = fn(Arc<HookConfig>, Vec<Alert>) -> Run;
 
 /// A way by which alerts get out; each stands in the file of its sender, and has a row in
 /// [`WAYS_OUT`](super::ways_out::WAYS_OUT). What the config says of it is a [`Destination`], whose keys are read by a row of

@@ -84,29 +84,32 @@ async fn send(delivery: DeliveryAttempt) -> HookOutcome {
 }
 
 /// Sends what is in force, or has ended of late, once more to Alertmanager, in one message.
-async fn repeat(hook: Arc<HookConfig>, alerts: Vec<Alert>) {
-    let Ok(to) = destination::<Webhook>(&hook) else {
-        return;
+async fn repeat(hook: Arc<HookConfig>, alerts: Vec<Alert>) -> HookOutcome {
+    let (to, first) = match (destination::<Webhook>(&hook), alerts.first()) {
+        (Ok(to), Some(first)) => (to, first),
+        (Err(why), _) => return HookOutcome::NotStarted(why),
+        (Ok(_), None) => return HookOutcome::Done,
     };
     let mut links = Vec::with_capacity(alerts.len());
     for alert in &alerts {
         links.push(link::of(&hook, alert).await);
     }
-    let body = alertmanager::again(alerts.iter().zip(&links), &hook.levels);
-    let (Ok(body), Some(first)) = (body, alerts.first()) else {
-        return;
+    let outcome = match alertmanager::again(alerts.iter().zip(&links), &hook.levels) {
+        Ok(body) => post(to, first, body, hook.timeout).await,
+        Err(error) => HookOutcome::NotStarted(error.to_string()),
     };
-    let outcome = post(to, first, body, hook.timeout).await;
+    let (webhook, alerts) = (&to.name, alerts.len());
     if outcome == HookOutcome::Done {
-        tracing::debug!(webhook = to.name, alerts = alerts.len(), "sent again");
+        tracing::debug!(webhook, alerts, "sent again");
     } else {
         tracing::warn!(
-            webhook = to.name,
-            alerts = alerts.len(),
+            webhook,
+            alerts,
             ?outcome,
             "what is in force could not be sent again"
         );
     }
+    outcome
 }
 
 /// Sends `alert`, whose JSON is `body`, within `limit`.

@@ -454,6 +454,10 @@ fn check_exits_1_where_a_benchmark_is_fed_by_nothing_and_says_what_the_files_hav
         let office = Office::with(&[("slope.csv", &text), ("site.toml", &config)]);
         let said = office.refused(1, &["check", "site.toml"]);
         assert!(said.contains(wanted), "no {wanted:?} in {said}");
+        let (_, json, _) = office.say(&["check", "site.toml", "--format", "json"]);
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        let unfed = json["preview"]["unfed"].as_array();
+        assert!(unfed.is_some_and(|unfed| !unfed.is_empty()), "{json}");
         office.done(&["check", "--config-only", "site.toml"]);
     }
 }

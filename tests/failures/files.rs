@@ -1,6 +1,6 @@
 //! What happens to files while they are followed.
 
-use crate::site::{Site, eventually};
+use crate::site::{Program, Site, eventually};
 use jiff::SignedDuration;
 use nix::sys::signal::Signal;
 use slipwatch::runtime::clock;
@@ -21,9 +21,8 @@ fn gaps(site: &Site) -> usize {
     site.events().matches("\"kind\":\"possible-gap\"").count()
 }
 
-#[test]
-fn a_row_that_is_ended_only_by_the_next_one_is_read_where_three_before_it_were_and_comes_again_with_its_rest()
- {
+/// A site of which five rows have been read, each of which the next one ended.
+fn ended_by_the_next() -> (Site, Program) {
     let site = Site::new("");
     site.append("incoming/5.csv", HEADER.trim_end());
     let program = site.caught_up();
@@ -33,6 +32,13 @@ fn a_row_that_is_ended_only_by_the_next_one_is_read_where_three_before_it_were_a
         eventually("the row before it", || site.values().len() >= before);
     }
     eventually("the last one", || site.values().len() == 5);
+    (site, program)
+}
+
+#[test]
+fn a_row_that_is_ended_only_by_the_next_one_is_read_where_three_before_it_were_and_comes_again_with_its_rest()
+ {
+    let (site, program) = ended_by_the_next();
     // Its writer was not done with this one.
     site.append("incoming/5.csv", "\n2020-01-06T00:00:00Z,6");
     eventually("what is there of it", || site.values().len() == 6);
@@ -47,15 +53,7 @@ fn a_row_that_is_ended_only_by_the_next_one_is_read_where_three_before_it_were_a
 /// As at a daily rotation.
 #[test]
 fn the_first_rows_of_a_new_file_are_not_waited_for_where_the_one_before_it_was_written_so() {
-    let site = Site::new("");
-    site.append("incoming/5.csv", HEADER.trim_end());
-    let program = site.caught_up();
-    for day in 1..6 {
-        site.append("incoming/5.csv", &format!("\n{}", row(day).trim_end()));
-        let before = day as usize - 1;
-        eventually("the row before it", || site.values().len() >= before);
-    }
-    eventually("the last one", || site.values().len() == 5);
+    let (site, program) = ended_by_the_next();
     fs::rename(site.path("incoming/5.csv"), site.path("5.old")).unwrap();
     let first = format!("{}\n{}", HEADER.trim_end(), row(6).trim_end());
     site.append("incoming/5.csv", &first);

@@ -5,11 +5,9 @@
 
 use super::{Dispatcher, locked};
 use crate::runtime::clock::Stopwatch;
-use crate::runtime::hook::{Alert, MessageState};
-use crate::runtime::ways_out::WAYS_OUT;
+use crate::runtime::hook::{Alert, HookOutcome, MessageState};
 use std::cmp::Reverse;
 use std::collections::VecDeque;
-use std::sync::Arc;
 use std::time::Duration;
 use tokio::task::JoinSet;
 
@@ -17,7 +15,6 @@ use tokio::task::JoinSet;
 const EACH: Duration = Duration::from_secs(60);
 /// Alerts that are sent again at most, the most severe of them.
 const MOST: usize = 1000;
-
 /// For so long what has ended is sent again: a repetition may take as long as a webhook's timeout.
 const ENDED_OF_LATE: Duration = Duration::from_secs(180);
 
@@ -25,7 +22,7 @@ const ENDED_OF_LATE: Duration = Duration::from_secs(180);
 #[derive(Debug)]
 pub(super) struct Repetition {
     since: Stopwatch,
-    under_way: JoinSet<()>,
+    under_way: JoinSet<HookOutcome>,
     /// Ends of late, the oldest first.
     ended: VecDeque<(Stopwatch, Alert)>,
 }
@@ -41,7 +38,8 @@ impl Repetition {
 
     /// Keeps the end of an alert for some time.
     pub(super) fn note(&mut self, alert: &Alert) {
-        if alert.state == MessageState::Resolved {
+        let is_noted = |(_, one): &(Stopwatch, Alert)| one.key == alert.key;
+        if alert.state == MessageState::Resolved && !self.ended.iter().any(is_noted) {
             self.ended.push_back((Stopwatch::start(), alert.clone()));
             let excess = self.ended.len().saturating_sub(MOST);
             self.ended.drain(..excess);
@@ -74,12 +72,6 @@ impl Dispatcher {
         }
         let ended = repetition.ended_of_late();
         for way in self.hooks.iter().filter(forgets) {
-            let Some(repeat) = (WAYS_OUT.iter())
-                .find(|one| one.table == way.hook.table())
-                .and_then(|one| one.repeat)
-            else {
-                continue;
-            };
             let name = way.hook.name();
             let delivered = locked(&self.delivered);
             let has_taken =
@@ -89,10 +81,11 @@ impl Dispatcher {
             drop(delivered);
             alerts.sort_by_key(|one| Reverse(one.level));
             alerts.truncate(MOST);
-            if !alerts.is_empty() {
-                repetition
-                    .under_way
-                    .spawn(repeat(Arc::clone(&way.hook), alerts));
+            if alerts.is_empty() {
+                continue;
+            }
+            if let Some(run) = self.runner.repeat(&way.hook, alerts) {
+                repetition.under_way.spawn(run);
             }
         }
     }

@@ -11,6 +11,11 @@ use std::sync::Arc;
 pub trait Runner: Debug + Send + Sync {
     /// Runs `hook` for `alert`; `attempt` counts from 1.
     fn run(&self, hook: Arc<HookConfig>, alert: Alert, attempt: u32) -> Run;
+
+    /// Sends `alerts` again to a hook that forgets them; `None` where nothing is sent again, as in a drill.
+    fn repeat(&self, _hook: &Arc<HookConfig>, _alerts: Vec<Alert>) -> Option<Run> {
+        None
+    }
 }
 
 /// Each by the way out of its table of the config: a program as a process of its own.
@@ -20,6 +25,11 @@ pub struct Processes;
 impl Runner for Processes {
     fn run(&self, hook: Arc<HookConfig>, alert: Alert, attempt: u32) -> Run {
         sent(&WAYS_OUT, hook, alert, attempt)
+    }
+
+    fn repeat(&self, hook: &Arc<HookConfig>, alerts: Vec<Alert>) -> Option<Run> {
+        let repeat = way_of(&WAYS_OUT, hook)?.repeat?;
+        Some(repeat(Arc::clone(hook), alerts))
     }
 }
 
@@ -33,10 +43,14 @@ impl Runner for Senders {
     }
 }
 
-fn sent(ways: &[&WayOut], hook: Arc<HookConfig>, alert: Alert, attempt: u32) -> Run {
+fn way_of<'a>(ways: &[&'a WayOut], hook: &HookConfig) -> Option<&'a WayOut> {
     let table = hook.table();
-    let Some(way) = ways.iter().find(|way| way.table == table) else {
-        let why = format!("no way out is called {table}");
+    ways.iter().copied().find(|way| way.table == table)
+}
+
+fn sent(ways: &[&WayOut], hook: Arc<HookConfig>, alert: Alert, attempt: u32) -> Run {
+    let Some(way) = way_of(ways, &hook) else {
+        let why = format!("no way out is called {}", hook.table());
         return Box::pin(std::future::ready(HookOutcome::NotStarted(why)));
     };
     (way.send)(DeliveryAttempt {

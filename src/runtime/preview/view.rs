@@ -20,6 +20,7 @@ pub struct Preview {
     /// Benchmarks in the files that no `[[benchmark]]` asks for.
     pub unwatched: BTreeSet<BenchmarkId>,
     /// What no file feeds.
+    #[serde(rename = "unfed")]
     pub without_readings: Vec<BenchmarkWithoutReadings>,
     /// What the files end with and the daemon refuses, and columns of benchmarks that a later header has no more, a line each: these are
     /// among the warnings.
@@ -197,6 +198,7 @@ pub struct CovariateView {
 
 /// A benchmark of the config without a reading, or a source without a benchmark.
 #[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
+#[schemars(rename = "Unfed")]
 pub struct BenchmarkWithoutReadings {
     /// The benchmark; none where a source was to give whatever benchmarks it has.
     pub benchmark: Option<BenchmarkId>,

@@ -56,10 +56,10 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Of a text whose writer is known to end each line only before the next one, where that `is_known`.
-    pub fn ended_later(is_known: bool) -> Self {
+    /// Of a text whose writer is known to end each line only before the next one.
+    pub fn to_be_ended_later() -> Self {
         Self {
-            ended_later: if is_known { ENDED_LATER } else { 0 },
+            ended_later: ENDED_LATER,
             ..Self::default()
         }
     }

@@ -50,10 +50,13 @@ impl Follower {
         file.header_before = latest.map(|(_, one)| one.header()).unwrap_or_default();
         let of_source = (self.files.iter()).filter(|((source, _), _)| *source == key.0);
         let newest = of_source.max_by_key(|(_, one)| one.modified);
-        if let (Content::Text(text), Some((_, newest))) = (&mut file.content, newest) {
-            let is_known =
-                matches!(&newest.content, Content::Text(text) if text.has_lines_ended_later());
-            text.ends_lines_later(is_known);
+        let is_known = newest.is_some_and(
+            |(_, one)| matches!(&one.content, Content::Text(text) if text.has_lines_ended_later()),
+        );
+        if let Content::Text(text) = &mut file.content
+            && is_known
+        {
+            text.expect_lines_ended_later();
         }
         file
     }

@@ -77,11 +77,9 @@ impl TextReader {
         }
     }
 
-    /// A text whose writer has ended the lines of another one only before the next line, where it has: so it will here.
-    pub(super) fn ends_lines_later(&mut self, is_known: bool) {
-        if self.lines == Lines::default() {
-            self.lines = Lines::ended_later(is_known);
-        }
+    /// Of a text of which nothing has been read: its writer has ended the lines of another one only before the next line, so it will here.
+    pub(super) fn expect_lines_ended_later(&mut self) {
+        self.lines = Lines::to_be_ended_later();
     }
 
     /// Whether its writer ends each line only before the next one.
