@@ -178,6 +178,41 @@ pub async fn follow(
     }
 }
 
+/// Whether the broker takes us and the subscription: asked as another client, so that the daemon's session goes on.
+///
+/// # Errors
+/// Why there is no connection, or that the subscription is refused.
+pub(super) async fn try_out(broker: &Broker) -> Result<(), String> {
+    let id = format!("slipwatch-doctor-{}", std::process::id());
+    let mut session = Session::passing(broker.clone(), id);
+    let mut failed = 0;
+    loop {
+        match session.next().await {
+            // One more of those who share a subscription would take messages from the others.
+            Ok(SessionEvent::Connected) if broker.topic.starts_with("$share/") => break,
+            Ok(SessionEvent::Connected) => {
+                (session.subscribe(&broker.topic)).map_err(|error| error.to_string())?;
+            }
+            Ok(SessionEvent::Subscribed) => break,
+            Ok(SessionEvent::SubscriptionRefused) => {
+                return Err(format!("refuses the subscription to {:?}", broker.topic));
+            }
+            Ok(SessionEvent::Message(_) | SessionEvent::Nothing) => {}
+            Err(error) => {
+                failed += 1;
+                // The second time in the other version of the protocol.
+                if failed == 2 {
+                    return Err(format!("cannot be reached: {error}"));
+                }
+            }
+        }
+    }
+    session.disconnect();
+    // Sends it; how the connection ends does not matter.
+    let _ = session.next().await.is_ok();
+    Ok(())
+}
+
 /// Sends it when there is room for its values.
 async fn send(
     mut delivery: ReceivedMessage,

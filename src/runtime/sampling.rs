@@ -41,7 +41,8 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
         let lines = covariate.suspicions.iter();
         lines.map(move |line| format!("covariate {name:?}: {line}"))
     });
-    let shared = several_sources(preview);
+    let mut shared = several_sources(preview);
+    shared.extend(unnamed_beside_a_broker(config));
     let behind = left_behind(preview);
     let waiting = held_back(config, preview);
     let ends = preview.refused_ends.iter().cloned();
@@ -127,6 +128,21 @@ fn left_behind(preview: &Preview) -> Vec<String> {
         })
     });
     left.collect()
+}
+
+/// A line where messages of a broker, which cannot be read in advance, may give benchmarks of another source too, as no `[[benchmark]]` says which one
+/// has them.
+fn unnamed_beside_a_broker(config: &Config) -> Option<String> {
+    let files = config.sources.iter().map(|source| &source.id);
+    let brokers = config.brokers.iter().map(|broker| &broker.id);
+    let sources: Vec<String> = files.chain(brokers).map(|id| format!("{id:?}")).collect();
+    let is_open = config.benchmarks.is_empty() && !config.brokers.is_empty();
+    (is_open && sources.len() > 1).then(|| {
+        format!(
+            "no [[benchmark]] says which of the sources {} it comes from: where two of them give one name, their readings are taken as one series",
+            sources.join(" and ")
+        )
+    })
 }
 
 /// A line for each benchmark that comes from more than one source: what one instrument says would be mixed with what another does.

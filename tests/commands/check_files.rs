@@ -357,4 +357,10 @@ fn a_benchmark_of_two_sources_is_warned_of_until_one_of_them_is_named() {
     assert!(said("").contains(warning), "{}", said(""));
     let named = "[[benchmark]]\nid = \"P1\"\nsource = \"two\"\n";
     assert!(!said(named).contains(warning), "{}", said(named));
+    let broker =
+        "[[source]]\nid = \"radio\"\nkind = \"mqtt\"\nurl = \"mqtt://127.0.0.1\"\ntopic = \"a\"\n";
+    let open = "no [[benchmark]] says which of the sources \"one\" and \"two\" and \"radio\"";
+    assert!(said(broker).contains(open), "{}", said(broker));
+    let named = format!("{broker}{named}");
+    assert!(!said(&named).contains(open), "{}", said(&named));
 }

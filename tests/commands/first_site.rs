@@ -301,6 +301,25 @@ fn init_says_of_a_file_without_readings_what_it_has_and_suggests_no_wrong_unit()
 }
 
 #[test]
+fn init_writes_nothing_where_no_file_has_a_column_that_is_named() {
+    let table = "time,E1 [mm],E2 [mm]\n2026-01-01T00:00:00Z,1,1\n2026-01-01T01:00:00Z,1.1,1\n";
+    let office = Office::with(&[("slope.csv", table)]);
+    let named = |second: &str| {
+        let second = format!("{second}=E2:displacement:mm");
+        let first = "E1 [mm]=E1:displacement:mm";
+        office.say(&["init", "slope.csv", "--column", first, "--column", &second])
+    };
+    let (exit, out, err) = named("E2[mm]");
+    assert_eq!(exit, 2, "{out}{err}");
+    assert!(err.contains("no file has a column \"E2[mm]\""), "{err}");
+    assert!(err.contains("\"E2 [mm]\""), "{err}");
+    assert!(!office.path("site.toml").exists());
+    let (exit, out, err) = named("E2 [mm]");
+    assert_eq!(exit, 0, "{out}{err}");
+    assert!(out.contains("benchmark E2, mm"), "{out}");
+}
+
+#[test]
 fn init_writes_over_no_config_unasked() {
     let office = Office::with(&[("slope.csv", &plain(5)), ("site.toml", "mine")]);
     let said = office.refused(2, &["init", "slope.csv"]);

@@ -637,6 +637,44 @@ async fn a_broker_that_refuses_the_subscription_is_reported_and_its_benchmark_is
     panic!("{}\n{}", daemon.text("notified"), daemon.text("log"));
 }
 
+/// What `doctor` says of a broker.
+fn doctor_of(broker: &Mosquitto) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("site.toml");
+    let port = broker.port;
+    let text = format!(
+        "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"radio\"\nkind = \"mqtt\"\n\
+         url = \"mqtt://logger:wrong@127.0.0.1:{port}\"\ntopic = \"site/#\"\n"
+    );
+    std::fs::write(&config, text).unwrap();
+    let doctor = std::process::Command::new(env!("CARGO_BIN_EXE_slipwatch"))
+        .arg("doctor")
+        .arg(config)
+        .output()
+        .unwrap();
+    let said = String::from_utf8(doctor.stdout).unwrap();
+    let line = said.lines().find(|line| line.contains("the broker"));
+    line.unwrap_or(&said).to_owned()
+}
+
+#[test]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+fn doctor_asks_the_broker_for_the_subscription_and_says_who_is_not_let_in() {
+    let open = Mosquitto::start();
+    let closed = Mosquitto::start_with(|_| "allow_anonymous false\n".to_owned());
+    std::thread::sleep(Duration::from_millis(500));
+    let taken = doctor_of(&open);
+    assert!(
+        taken.starts_with("good") && taken.contains("takes the subscription"),
+        "{taken}"
+    );
+    let refused = doctor_of(&closed);
+    assert!(
+        refused.starts_with("wrong") && refused.contains("NotAuthorized"),
+        "{refused}"
+    );
+}
+
 /// The benchmarks of a backlog, the readings of each that a daemon knows before it, and those that queue, an hour apart.
 const BENCHMARKS: usize = 10;
 const KNOWN: usize = 20;

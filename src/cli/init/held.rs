@@ -33,11 +33,12 @@ impl FoundInFile {
     }
 }
 
-/// Looks through a file.
+/// Looks through a file; adds the names of its columns to `columns`.
 pub(super) fn held(
     file: &Path,
     source: &PlannedSource,
     args: &Args,
+    columns: &mut BTreeSet<String>,
 ) -> anyhow::Result<FoundInFile> {
     let mut options = ReadOptions {
         dialect: source.dialect.clone(),
@@ -47,6 +48,7 @@ pub(super) fn held(
         options.conventions.clock.zone = Some(zone.clone());
     }
     let looked = look(file, source.kind, &options)?;
+    columns.extend(looked.columns.iter().map(|(name, _)| name.clone()));
     let stated = |benchmark: &BenchmarkId, unit: Unit| {
         let mut maps = args.file.columns.iter();
         let map =

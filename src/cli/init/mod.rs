@@ -190,6 +190,7 @@ fn can_be_followed(file: &Path) -> anyhow::Result<()> {
 fn plan(args: &Args) -> anyhow::Result<InitPlan> {
     let (mut problems, mut beside) = (Problems::default(), Vec::new());
     let (mut sources, mut benchmarks) = (Vec::new(), BTreeMap::new());
+    let mut columns = BTreeSet::new();
     for file in &args.files {
         can_be_followed(file)?;
         let kind = kind_of(file)?;
@@ -203,7 +204,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
             }
         };
         let mut source = planned(file, kind, written, &sources, args)?;
-        match held(file, &source, args)? {
+        match held(file, &source, args, &mut columns)? {
             FoundInFile::Benchmarks(found) => {
                 for benchmark in found {
                     if let Some(other) = benchmarks.insert(benchmark.id.clone(), benchmark) {
@@ -229,6 +230,9 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
         }
     }
     problems.open.extend(dated::days_of_one(&benchmarks));
+    problems
+        .open
+        .extend(no_such_column(&sources, columns, args));
     problems.none()?;
     Ok(InitPlan {
         name: site_name(args),
@@ -247,6 +251,26 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
         averaging: args.file.averaging.map(in_words),
         evacuation_time: args.evacuation_time.map(in_words),
         hook: args.hook.clone(),
+    })
+}
+
+/// What is wrong with a `--column` that no file has; messages and recordings have no columns that could be known here.
+fn no_such_column(
+    sources: &[PlannedSource],
+    columns: BTreeSet<String>,
+    args: &Args,
+) -> Option<String> {
+    let has_columns =
+        |source: &PlannedSource| matches!(source.kind, SourceKind::Csv | SourceKind::Toa5);
+    let mut maps = args.file.columns.iter();
+    let unknown = maps.find(|map| !columns.contains(&map.column))?;
+    let are_all_known = sources.len() == args.files.len() && sources.iter().all(has_columns);
+    are_all_known.then(|| {
+        let no_such = IngestError::NoSuchColumn {
+            column: unknown.column.clone(),
+            available: columns.into_iter().collect(),
+        };
+        format!("--column: {no_such}")
     })
 }
 

@@ -2,16 +2,15 @@
 
 use super::{CheckVerdict, Finding};
 use crate::config::{Broker, Config, FileSource};
+use crate::runtime::mqtt;
 use crate::runtime::tail::{Decoder, list};
-use crate::runtime::tls;
 use std::fs::File;
 use std::io::{self, Read};
-use std::net::{TcpStream, ToSocketAddrs};
 use std::path::Path;
 use std::time::Duration;
 
 /// A broker that takes longer to answer is not there.
-const ANSWER: Duration = Duration::from_secs(3);
+const ANSWER: Duration = Duration::from_secs(10);
 const SOURCE: &str = "source";
 
 /// One finding for each source.
@@ -63,24 +62,23 @@ fn open(file: &Path) -> io::Result<()> {
 }
 
 fn broker(broker: &Broker) -> Finding {
-    let address = &broker.address;
-    let tried = (address.host.as_str(), address.port).to_socket_addrs();
-    let answer = tried.and_then(|mut places| {
-        let none = || io::Error::other("the name has no address");
-        TcpStream::connect_timeout(&places.next().ok_or_else(none)?, ANSWER)
-    });
-    let trusted = address
-        .is_secured
-        .then(|| tls::config(broker.ca_file.as_deref()))
-        .transpose();
-    let (verdict, text) = match (answer, trusted) {
-        (Ok(_), Ok(_)) => (CheckVerdict::Good, "answers".to_owned()),
-        (Err(error), _) => (CheckVerdict::Wrong, format!("cannot be reached: {error}")),
-        (Ok(_), Err(why)) => (CheckVerdict::Wrong, format!("can prove nothing: {why}")),
+    let asked = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| format!("could not be asked: {error}"))
+        .and_then(|runtime| {
+            let answer = async { tokio::time::timeout(ANSWER, mqtt::try_out(broker)).await };
+            let none = |_| Err(format!("did not answer within {} s", ANSWER.as_secs()));
+            let answer = runtime.block_on(answer).unwrap_or_else(none);
+            // A search of its name may still be under way.
+            runtime.shutdown_background();
+            answer
+        });
+    let (verdict, text) = match asked {
+        Ok(()) => (CheckVerdict::Good, "takes the subscription".to_owned()),
+        Err(why) => (CheckVerdict::Wrong, why),
     };
-    Finding::new(
-        SOURCE,
-        verdict,
-        format!("{:?}: the broker {address:?} {text}", broker.id),
-    )
+    let address = &broker.address;
+    let text = format!("{:?}: the broker {address:?} {text}", broker.id);
+    Finding::new(SOURCE, verdict, text)
 }

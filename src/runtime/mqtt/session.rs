@@ -37,6 +37,8 @@ pub(super) type NoConnection = Box<dyn Error + Send + Sync>;
 pub(super) struct Session {
     broker: Broker,
     client_id: String,
+    /// Whether the broker keeps what comes for it while there is no connection.
+    is_kept: bool,
     version: Version,
     /// Made with the first connection; over TLS again with each, so that other authorities hold from the next one on.
     link: Option<Link>,
@@ -125,10 +127,19 @@ impl Session {
         Self {
             broker,
             client_id,
+            is_kept: true,
             version: Version::Five,
             link: None,
             is_accepted: false,
             ended: Arc::default(),
+        }
+    }
+
+    /// One that the broker forgets when the connection ends.
+    pub(super) fn passing(broker: Broker, client_id: String) -> Self {
+        Self {
+            is_kept: false,
+            ..Self::new(broker, client_id)
         }
     }
 
@@ -144,7 +155,10 @@ impl Session {
     pub(super) async fn next(&mut self) -> Result<SessionEvent, NoConnection> {
         let link = match &mut self.link {
             Some(link) => link,
-            none => none.insert(open(self.version, &self.broker, &self.client_id).await?),
+            none => {
+                let client = (self.client_id.as_str(), self.is_kept);
+                none.insert(open(self.version, &self.broker, client).await?)
+            }
         };
         let came = match link {
             Link::Five(client, connection) => match connection.poll().await {
@@ -214,13 +228,17 @@ impl Session {
     }
 }
 
-/// Ready to connect.
-async fn open(version: Version, broker: &Broker, client_id: &str) -> Result<Link, NoConnection> {
+/// Ready to connect, as a client of this id, whose session the broker keeps or not.
+async fn open(
+    version: Version,
+    broker: &Broker,
+    client: (&str, bool),
+) -> Result<Link, NoConnection> {
     let transport = transport(&broker.address, broker.ca_file.as_deref())?;
     let to = (host_of(&broker.address).await?, broker.address.port);
     Ok(match version {
-        Version::Five => five(broker, to, client_id, transport),
-        Version::Three => three(broker, to, client_id, transport),
+        Version::Five => five(broker, to, client, transport),
+        Version::Three => three(broker, to, client, transport),
     })
 }
 
@@ -252,12 +270,13 @@ pub(super) fn transport(
     Ok(Transport::tls_with_config(TlsConfiguration::Rustls(config)))
 }
 
-fn five(broker: &Broker, to: (String, u16), client_id: &str, transport: Transport) -> Link {
+fn five(broker: &Broker, to: (String, u16), client: (&str, bool), transport: Transport) -> Link {
     let address = &broker.address;
+    let (client_id, is_kept) = client;
     let mut options = v5::MqttOptions::new(client_id, to.0, to.1);
     options
-        .set_clean_start(false)
-        .set_session_expiry_interval(Some(u32::MAX))
+        .set_clean_start(!is_kept)
+        .set_session_expiry_interval(is_kept.then_some(u32::MAX))
         .set_receive_maximum(Some(MOST_UNACKNOWLEDGED))
         .set_max_packet_size(Some(LONGEST_PACKET))
         .set_manual_acks(true)
@@ -270,11 +289,12 @@ fn five(broker: &Broker, to: (String, u16), client_id: &str, transport: Transpor
     Link::Five(client, Box::new(connection))
 }
 
-fn three(broker: &Broker, to: (String, u16), client_id: &str, transport: Transport) -> Link {
+fn three(broker: &Broker, to: (String, u16), client: (&str, bool), transport: Transport) -> Link {
     let address = &broker.address;
+    let (client_id, is_kept) = client;
     let mut options = v3::MqttOptions::new(client_id, to.0, to.1);
     options
-        .set_clean_session(false)
+        .set_clean_session(!is_kept)
         .set_manual_acks(true)
         .set_keep_alive(KEEP_ALIVE)
         .set_max_packet_size(LONGEST_PACKET as usize, LONGEST_SENT)

@@ -6,7 +6,8 @@ use super::position::{FileId, Saved};
 use crate::reading::Timestamp;
 use crate::runtime::clock::{self, Stopwatch};
 use std::cmp::Reverse;
-use std::fs::{File, Metadata};
+use std::collections::BTreeMap;
+use std::fs::File;
 use std::os::fd::AsRawFd;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -25,6 +26,36 @@ enum NewPath {
     Nameless(PathBuf),
 }
 
+/// Which names files have in folders, each of which is listed once although thousands of files may have gone from it.
+#[derive(Default)]
+pub(super) struct FolderNames(BTreeMap<PathBuf, BTreeMap<FileId, Vec<PathBuf>>>);
+
+impl FolderNames {
+    /// The names in the folder of `file` that lead to it.
+    fn of(&mut self, file: &FileTail) -> &[PathBuf] {
+        let (Some(folder), Some(place)) = (file.path.parent(), file.place) else {
+            return &[];
+        };
+        if !self.0.contains_key(folder) {
+            self.0.insert(folder.to_owned(), names_in(folder));
+        }
+        let names = self.0.get(folder).and_then(|names| names.get(&place));
+        names.map_or(&[], Vec::as_slice)
+    }
+}
+
+fn names_in(folder: &Path) -> BTreeMap<FileId, Vec<PathBuf>> {
+    let mut names: BTreeMap<FileId, Vec<PathBuf>> = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        // Not what a link leads to: that is elsewhere.
+        if let Ok(metadata) = entry.metadata() {
+            let own = names.entry(FileId::of(&metadata)).or_default();
+            own.push(entry.path());
+        }
+    }
+    names
+}
+
 /// What becomes of a file that is no longer under its name.
 pub(super) enum Departure {
     /// It is read on, there.
@@ -37,11 +68,11 @@ pub(super) enum Departure {
 
 impl FileTail {
     /// The file is no longer under its name: finds where it is, so that what was, and is, written to it is read.
-    pub(super) fn leave(&mut self) -> Departure {
+    pub(super) fn leave(&mut self, folders: &mut FolderNames) -> Departure {
         if self.place.is_none() || matches!(self.content, Content::Complete | Content::Refused(_)) {
             return Departure::Over;
         }
-        let (path, is_nameless) = match self.new_path() {
+        let (path, is_nameless) = match self.new_path(folders) {
             Some(NewPath::Named(path)) => (path, false),
             Some(NewPath::Nameless(path)) => (path, true),
             None => return Departure::Untraced,
@@ -88,15 +119,18 @@ impl FileTail {
         }
     }
 
-    fn new_path(&self) -> Option<NewPath> {
+    fn new_path(&self, folders: &mut FolderNames) -> Option<NewPath> {
         if self.is_at(&self.path) {
             return Some(NewPath::Named(self.path.clone()));
         }
         let held = self.held.as_ref();
         let inode = held.and_then(|file| file.metadata().ok());
         let is_removed = inode.as_ref().is_some_and(|inode| inode.nlink() == 0);
-        if !is_removed && let Some(path) = self.in_its_folder() {
-            return Some(NewPath::Named(path));
+        if !is_removed {
+            let names = folders.of(self);
+            if let Some(path) = names.iter().find(|path| self.is_at(path)) {
+                return Some(NewPath::Named(path.clone()));
+            }
         }
         let name = (!is_removed).then(|| name_of(held?)).flatten();
         if let Some(name) = name.filter(|name| self.is_at(name)) {
@@ -106,16 +140,6 @@ impl FileTail {
         let mut name = self.origin.clone().into_os_string();
         name.push(format!(" (gone, {})", inode?.ino()));
         Some(NewPath::Nameless(name.into()))
-    }
-
-    fn in_its_folder(&self) -> Option<PathBuf> {
-        let is_it = |metadata: &Metadata| Some(FileId::of(metadata)) == self.place;
-        let entries = std::fs::read_dir(self.path.parent()?).ok()?;
-        // Not what a link leads to: that is elsewhere.
-        let mut own = entries
-            .flatten()
-            .filter(|entry| entry.metadata().is_ok_and(|metadata| is_it(&metadata)));
-        own.find_map(|entry| Some(entry.path()).filter(|path| self.is_at(path)))
     }
 
     /// Whether it has not been written to for so long that nothing more is expected of it.

@@ -7,6 +7,7 @@ use crate::reading::counted;
 use crate::runtime::clock;
 use crate::runtime::service_faults::{FaultPlace, ServiceFaultKind};
 use jiff::SignedDuration;
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
@@ -34,7 +35,44 @@ impl Follower {
             let (kind, text) = file.fault()?;
             Some((place(kind, &self.sources[*source].id, path), text))
         });
-        folders.chain(files).chain(self.unended_rows()).collect()
+        let files: Vec<(FaultPlace, String)> = files.collect();
+        let one_by_one = self.refused_in_turn(&files);
+        let faults = folders.chain(self.unended_rows()).chain(one_by_one);
+        faults.chain(files.iter().cloned()).collect()
+    }
+
+    /// The sources whose newest files hold a few rows each, of which none could be used; not those of which `files` names one.
+    fn refused_in_turn(&self, files: &[(FaultPlace, String)]) -> Vec<(FaultPlace, String)> {
+        let all = self.files.iter();
+        let mut newest_first: Vec<(usize, &FileTail)> =
+            all.map(|((source, _), file)| (*source, file)).collect();
+        newest_first.sort_by_key(|(source, file)| (*source, Reverse(file.modified)));
+        let mut faults = Vec::new();
+        for of_source in newest_first.chunk_by(|(one, _), (next, _)| one == next) {
+            let id = &self.sources[of_source[0].0].id;
+            let place = FaultPlace::of_source(ServiceFaultKind::RowsRefused, id);
+            if files.iter().any(|(named, _)| named.source == place.source) {
+                continue;
+            }
+            let (mut total, mut newest) = (0, None);
+            for (_, file) in of_source {
+                if file.refused_rows.count > 0 {
+                    total += file.refused_rows.count;
+                    newest = newest.or(Some(file));
+                }
+                if file.refused_rows.is_below_used {
+                    break;
+                }
+            }
+            if let Some(file) = newest.filter(|_| total >= MOST_REFUSED) {
+                let (path, why) = (file.path.display(), &file.refused_rows.why);
+                let text = format!(
+                    "none of the newest {total} rows of the newest files could be used, as in {path}: {why}"
+                );
+                faults.push((place, text));
+            }
+        }
+        faults
     }
 
     /// Of each source the file whose last row waits for its end, and how many others there are: where one program writes them all, all are alike.
@@ -63,12 +101,15 @@ impl Follower {
 impl FileTail {
     /// Whether its last row has no line break, and nobody has written more of it for some time.
     fn waits_for_an_end(&self) -> bool {
-        let is_within_a_row =
-            matches!(&self.content, Content::Text(text) if text.is_within_a_line());
-        let has_rested = (self.idle_since).is_some_and(|since| since.elapsed() >= RESTED);
         let is_of_interest = (self.changed)
             .is_some_and(|changed| clock::now().duration_since(changed) <= OF_INTEREST);
-        is_within_a_row && has_rested && is_of_interest && self.departed.is_none()
+        self.rests_within_a_line() && is_of_interest && self.departed.is_none()
+    }
+
+    /// Whether nothing ends its last line, and nobody has written for some time.
+    pub(super) fn rests_within_a_line(&self) -> bool {
+        matches!(&self.content, Content::Text(text) if text.is_within_a_line())
+            && (self.idle_since).is_some_and(|since| since.elapsed() >= RESTED)
     }
 
     fn fault(&self) -> Option<(ServiceFaultKind, String)> {
@@ -81,7 +122,7 @@ impl FileTail {
             let text = format!("{file} cannot be read: {trouble}");
             return Some((ServiceFaultKind::FileUnreadable, text));
         }
-        let RefusedRows { count, why } = &self.refused_rows;
+        let RefusedRows { count, why, .. } = &self.refused_rows;
         (*count >= MOST_REFUSED).then(|| {
             let text = format!("none of the newest {count} rows of {file} could be used: {why}");
             (ServiceFaultKind::RowsRefused, text)
@@ -97,11 +138,15 @@ mod tests {
 
     /// A follower of `*.csv` in a folder.
     fn follower(folder: &Path) -> Follower {
+        follower_from(folder, &[])
+    }
+
+    fn follower_from(folder: &Path, saved: &[(String, Vec<u8>)]) -> Follower {
         let text = "[site]\nname = \"s\"\nstate_dir = \"state\"\n[[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"*.csv\"\n";
         let file = folder.join("site.toml");
         fs::write(&file, text).unwrap();
         let config = crate::config::load(&file).unwrap();
-        Follower::new(&config.sources, &[], &[])
+        Follower::new(&config.sources, &[], saved)
     }
 
     #[tokio::test(start_paused = true)]
@@ -135,6 +180,67 @@ mod tests {
         assert!(faults(Duration::from_secs(61)).await.is_empty());
     }
 
+    #[tokio::test(start_paused = true)]
+    async fn last_rows_without_a_line_break_are_read_where_three_files_were_left_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let upload = |hour: u64| {
+            let row = format!("time,displacement_mm\n2026-01-01T0{hour}:00:00Z,1.0");
+            let file = folder.path().join(format!("{hour}.csv"));
+            fs::write(&file, row).unwrap();
+            let written = std::time::SystemTime::from(clock::now())
+                - Duration::from_secs(36_000 - 3600 * hour);
+            let file = fs::File::options().append(true).open(file).unwrap();
+            file.set_modified(written).unwrap();
+        };
+        let mut follower = follower(folder.path());
+        let mut read = async |seconds| {
+            let mut arrivals = 0;
+            for _ in 0..3 {
+                arrivals += follower.poll(clock::now()).arrivals.len();
+                tokio::time::advance(Duration::from_secs(seconds)).await;
+            }
+            arrivals
+        };
+        upload(1);
+        upload(2);
+        assert_eq!(read(61).await, 0);
+        upload(3);
+        assert_eq!(read(1).await, 0, "the third may still be written");
+        assert_eq!(read(61).await, 3);
+        upload(4);
+        assert_eq!(read(2).await, 1, "the fourth is known");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn an_export_that_is_written_anew_without_a_last_line_break_is_read_whole_from_the_fourth_on()
+     {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("5.csv");
+        let mut follower = follower(folder.path());
+        let mut newest = async |hours: u64| {
+            let rows = (0..=hours).map(|hour| format!("2026-01-01T0{hour}:00:00Z,1.{hour}"));
+            let rows: Vec<String> = rows.collect();
+            let text = format!("time,displacement_mm\n{}", rows.join("\n"));
+            let new = folder.path().join("5.new");
+            fs::write(&new, text).unwrap();
+            fs::rename(&new, &file).unwrap();
+            let mut newest = None;
+            for _ in 0..6 {
+                let arrivals = follower.poll(clock::now()).arrivals;
+                newest = newest.max(arrivals.iter().map(|one| one.time).max());
+                tokio::time::advance(Duration::from_secs(3)).await;
+            }
+            newest.map(|time| time.to_string())
+        };
+        let hour = |hour: u64| Some(format!("2026-01-01T0{hour}:00:00Z"));
+        for hours in 1..=3 {
+            assert_eq!(newest(hours).await, hour(hours - 1));
+        }
+        for hours in 4..=6 {
+            assert_eq!(newest(hours).await, hour(hours));
+        }
+    }
+
     #[test]
     fn rows_that_cannot_be_used_are_a_fault_from_the_fifth_in_a_row_until_one_can() {
         let folder = tempfile::tempdir().unwrap();
@@ -158,5 +264,63 @@ mod tests {
         assert_eq!(place.kind, ServiceFaultKind::RowsRefused);
         assert!(text.contains("none of the newest 5 rows"), "{text}");
         assert!(faults("2026-01-01T01:00:00Z,1.1\n").is_empty());
+    }
+
+    #[test]
+    fn rows_that_cannot_be_used_are_counted_over_files_of_one_row_each() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut follower = follower(folder.path());
+        let mut faults = |hour: u64, row: &str| {
+            let file = folder.path().join(format!("{hour}.csv"));
+            fs::write(&file, format!("time,displacement_mm\n{row}\n")).unwrap();
+            let written = std::time::SystemTime::from(clock::now())
+                - Duration::from_secs(36_000 - 3600 * hour);
+            let file = fs::File::options().append(true).open(file).unwrap();
+            file.set_modified(written).unwrap();
+            for _ in 0..4 {
+                follower.poll(clock::now());
+            }
+            follower.faults()
+        };
+        assert!(faults(0, "2026-01-01T00:00:00Z,1.0").is_empty());
+        for hour in 1..=4 {
+            assert!(faults(hour, "2026-01-01T01:00:00Z;1.1").is_empty());
+        }
+        let lasting = faults(5, "2026-01-01T01:00:00Z;1.1");
+        let [(place, text)] = &lasting[..] else {
+            panic!("{lasting:?}");
+        };
+        assert_eq!(place.kind, ServiceFaultKind::RowsRefused);
+        assert!(
+            text.contains("newest 5 rows") && text.contains("5.csv"),
+            "{text}"
+        );
+        assert!(faults(6, "2026-01-01T06:00:00Z,1.0").is_empty());
+    }
+
+    #[test]
+    fn rows_that_cannot_be_used_are_a_fault_after_a_restart_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("5.csv");
+        let rows = "2026-01-01T01:00:00Z;1.1\n".repeat(5);
+        fs::write(
+            &file,
+            format!("time,displacement_mm\n2026-01-01T00:00:00Z,1.0\n{rows}"),
+        )
+        .unwrap();
+        let mut first = follower(folder.path());
+        let mut saved = BTreeMap::new();
+        for _ in 0..4 {
+            let positions = first.poll(clock::now()).positions;
+            saved.extend(positions.into_iter().map(|one| (one.name, one.body)));
+        }
+        assert_eq!(first.faults().len(), 1);
+        let saved: Vec<(String, Vec<u8>)> = saved
+            .into_iter()
+            .filter_map(|(name, body)| Some((name, body?)))
+            .collect();
+        let mut second = follower_from(folder.path(), &saved);
+        second.poll(clock::now());
+        assert_eq!(second.faults(), first.faults());
     }
 }

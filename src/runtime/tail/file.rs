@@ -361,7 +361,8 @@ impl FileTail {
     /// From its start, with the columns of its header before where it has none now.
     fn begin_anew(&mut self) {
         self.header_before = self.header();
-        self.content = Content::of(&self.decoder, &self.origin);
+        let before = std::mem::replace(&mut self.content, Content::of(&self.decoder, &self.origin));
+        self.follow_on(&before);
         self.at = 0;
         (self.earlier, self.other_since) = (None, None);
     }
@@ -393,8 +394,12 @@ impl FileTail {
         let count = file.read_at(&mut buffer, self.at)?;
         self.at += count as u64;
         if let Content::Text(text) = &mut self.content {
+            let has_lines_ended_later = text.has_lines_ended_later();
             let fed = text.feed(&buffer[..count]);
-            if let Some(reader) = self.without_header(&fed) {
+            if let Some(mut reader) = self.without_header(&fed) {
+                if has_lines_ended_later {
+                    reader.expect_lines_ended_later();
+                }
                 self.content = Content::Text(Box::new(reader));
                 self.at = 0;
                 return self.read_text(file);

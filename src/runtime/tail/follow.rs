@@ -179,6 +179,7 @@ impl Follower {
         if self.heads.is_empty() {
             self.looked = Some(Stopwatch::start());
             self.rescan();
+            self.expect_unended_files();
             for (key, file) in &mut self.files {
                 file.refill();
                 self.heads.extend(head(key.clone(), file));

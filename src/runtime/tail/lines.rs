@@ -56,12 +56,28 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Of a text whose writer is known to end each line only before the next one.
-    pub fn to_be_ended_later() -> Self {
+    /// The writer of this text is known to end each line only before the next one.
+    pub fn expect_ended_later(&mut self) {
+        self.ended_later = self.ended_later.max(ENDED_LATER);
+    }
+
+    /// Of the text that the same writer puts in place of this one: it may leave its last line without an end as well.
+    #[must_use]
+    pub fn written_anew(&self) -> Self {
+        let ended_later = if self.is_unended() {
+            self.ended_later.saturating_add(1)
+        } else {
+            0
+        };
         Self {
-            ended_later: ENDED_LATER,
+            ended_later,
             ..Self::default()
         }
+    }
+
+    /// Whether nothing ends the last line so far, returned or not.
+    fn is_unended(&self) -> bool {
+        self.too_long || !self.partial.is_empty()
     }
 
     /// Whether the writer has been seen to end each line only before the next one.
@@ -134,7 +150,7 @@ impl Lines {
 
     /// Whether the text ends within a line.
     pub fn is_within_a_line(&self) -> bool {
-        self.too_long || !self.partial.is_empty() && !self.is_returned
+        self.is_unended() && !self.is_returned
     }
 
     fn hold(&mut self, bytes: &[u8]) {

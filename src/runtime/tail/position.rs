@@ -1,7 +1,7 @@
 //! Where a restart goes on in a file, as it is kept.
 
 use super::records::Channels;
-use super::text::SavedText;
+use super::text::{RefusedRows, SavedText};
 use crate::reading::BenchmarkId;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -36,6 +36,9 @@ pub(super) struct Saved {
     #[serde(default, rename = "earlier_sum")]
     pub(super) earlier: Option<u64>,
     pub(super) content: SavedContent,
+    /// The newest lines, where all of them could not be used; none where an older version has written this.
+    #[serde(default)]
+    pub(super) refused_rows: RefusedRows,
     /// The name under which it was found first, where it was renamed since.
     #[serde(default)]
     pub(super) origin: Option<PathBuf>,

@@ -5,7 +5,7 @@
 //! a rotation has given it that name: it is then what it was.
 
 use super::decode::Decoder;
-use super::departed::Departure;
+use super::departed::{Departure, FolderNames};
 use super::file::FileTail;
 use super::follow::{FileKey, Followed, Follower, name};
 use super::position::FileId;
@@ -96,9 +96,9 @@ impl Follower {
             .into_iter()
             .filter_map(|key| self.files.remove_entry(&key))
             .collect();
-        let mut moves = Vec::new();
+        let (mut moves, mut folders) = (Vec::new(), FolderNames::default());
         for (key, mut file) in gone {
-            match self.outcome(&key, &mut file, &listing) {
+            match self.outcome(&key, &mut file, &listing, &mut folders) {
                 GoneFile::Stays => {
                     self.files.insert(key, file);
                 }
@@ -125,7 +125,13 @@ impl Follower {
         }
     }
 
-    fn outcome(&self, key: &FileKey, file: &mut FileTail, listing: &Listing) -> GoneFile {
+    fn outcome(
+        &self,
+        key: &FileKey,
+        file: &mut FileTail,
+        listing: &Listing,
+        folders: &mut FolderNames,
+    ) -> GoneFile {
         if !self.sources[key.0].still_asks_for(file) {
             return without_trace(key, file);
         }
@@ -142,7 +148,7 @@ impl Follower {
                 GoneFile::Closed(None)
             };
         }
-        match file.leave() {
+        match file.leave(folders) {
             Departure::To(path) if path == key.1 => GoneFile::Stays,
             Departure::To(path) => {
                 let to = (key.0, path);

@@ -13,6 +13,9 @@ use std::sync::Arc;
 /// What a rotation appends to a name, or puts before it, beside digits and what stands between them.
 const WORDS: [&str; 5] = ["old", "bak", "prev", "T", "Z"];
 
+/// So many files whose last line has no line break are no accident: the program that writes them ends none with one.
+const LEFT_UNENDED: usize = 3;
+
 /// The first names of files that have been renamed, by their present ones.
 pub(super) type FirstNames = BTreeMap<FileKey, PathBuf>;
 
@@ -47,18 +50,37 @@ impl Follower {
             .iter()
             .filter(|((source, _), one)| *source == key.0 && one.origin == key.1);
         let latest = before.max_by_key(|(_, one)| one.modified);
-        file.header_before = latest.map(|(_, one)| one.header()).unwrap_or_default();
+        if let Some((_, latest)) = latest {
+            file.header_before = latest.header();
+            file.follow_on(&latest.content);
+        }
         let of_source = (self.files.iter()).filter(|((source, _), _)| *source == key.0);
         let newest = of_source.max_by_key(|(_, one)| one.modified);
         let is_known = newest.is_some_and(
             |(_, one)| matches!(&one.content, Content::Text(text) if text.has_lines_ended_later()),
         );
-        if let Content::Text(text) = &mut file.content
-            && is_known
-        {
-            text.expect_lines_ended_later();
+        if is_known {
+            file.expect_lines_ended_later();
         }
         file
+    }
+
+    /// Where a source's program ends none of its files with a line break, the last line of each is whole once it has rested: three files
+    /// that were left so at other times show it.
+    pub(super) fn expect_unended_files(&mut self) {
+        let mut left: BTreeMap<usize, BTreeSet<i64>> = BTreeMap::new();
+        for ((source, _), file) in &self.files {
+            if file.rests_within_a_line() {
+                let minute = file.modified.0.div_euclid(60);
+                left.entry(*source).or_default().insert(minute);
+            }
+        }
+        left.retain(|_, minutes| minutes.len() >= LEFT_UNENDED);
+        for ((source, _), file) in &mut self.files {
+            if left.contains_key(source) && file.rests_within_a_line() {
+                file.expect_lines_ended_later();
+            }
+        }
     }
 }
 
@@ -70,6 +92,20 @@ fn packed(name: &Path) -> PathBuf {
 }
 
 impl FileTail {
+    /// Nothing has been read of it: it stands under the name of one whose content was `before`.
+    pub(super) fn follow_on(&mut self, before: &Content) {
+        if let (Content::Text(text), Content::Text(before)) = (&mut self.content, before) {
+            text.follow_on(before);
+        }
+    }
+
+    /// Its last line is whole once whoever writes has had the time to go on.
+    fn expect_lines_ended_later(&mut self) {
+        if let Content::Text(text) = &mut self.content {
+            text.expect_lines_ended_later();
+        }
+    }
+
     /// The lines of its header, where it is a text that has been read so far.
     pub(super) fn header(&self) -> Vec<String> {
         match &self.content {

@@ -52,6 +52,7 @@ impl FileTail {
         file.place = saved.place;
         file.mark.clone_from(&saved.mark);
         file.earlier = saved.earlier;
+        file.refused_rows = saved.refused_rows.clone();
         file.reported = saved.clone();
         // From here on these readings are taken from it, though it may not grow.
         file.safe = Saved {
@@ -112,6 +113,7 @@ impl FileTail {
             mark: self.mark.clone(),
             earlier: self.earlier,
             content,
+            refused_rows: self.refused_rows.clone(),
             origin: (self.origin != self.path).then(|| self.origin.clone()),
             read_as: Some(Arc::clone(self.decoder.read_as())),
         };

@@ -34,12 +34,14 @@ pub(in crate::runtime) struct LinesRead {
 }
 
 /// The newest lines of a file, where none of them could be used.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct RefusedRows {
     /// Since the last line of which something could be used.
     pub(super) count: u64,
     /// What is wrong with the newest.
     pub(super) why: String,
+    /// Whether something of a line before them could be used.
+    pub(super) is_below_used: bool,
 }
 
 impl RefusedRows {
@@ -48,6 +50,7 @@ impl RefusedRows {
         let used = lines.items.last().map(|(number, _)| *number);
         if used.is_some() {
             self.count = 0;
+            self.is_below_used = true;
         }
         // Of a line of which a part can be used the rest is set aside too.
         let since = |line: &&BadLine| used.is_none_or(|used| line.number > used);
@@ -77,9 +80,14 @@ impl TextReader {
         }
     }
 
-    /// Of a text of which nothing has been read: its writer has ended the lines of another one only before the next line, so it will here.
+    /// Its writer has ended the lines of other texts only before the next line, or not at all, so it will here.
     pub(super) fn expect_lines_ended_later(&mut self) {
-        self.lines = Lines::to_be_ended_later();
+        self.lines.expect_ended_later();
+    }
+
+    /// Of a text of which nothing has been read: the same writer has put it in place of `before`.
+    pub(super) fn follow_on(&mut self, before: &Self) {
+        self.lines = before.lines.written_anew();
     }
 
     /// Whether its writer ends each line only before the next one.
