@@ -11,12 +11,13 @@ use super::evidence::{self, Evidence};
 use super::learned::LEARNED;
 use super::members::{LARGEST_INPUT, LONGEST_DAYS, Members};
 use super::network::{INPUTS, Network};
+use super::spans::{
+    AskedSpan, FAR_APART_DAYS, FIRST_SPANS, at_least, between_far_readings, passage, spans,
+};
 use super::sudden::slowed;
 use super::{Passage, PastEvent, Scale, Scales};
 use crate::fit::Observations;
 
-/// Spans beyond the longest scale that are still asked for.
-const BEYOND: usize = 3;
 /// The share of the network's chance that is left where no acceleration shows, over long spans, and the span, days, at
 /// which half of that is reached: within days nothing is called that the readings do not show.
 const UNSEEN: f64 = 0.15;
@@ -27,8 +28,6 @@ const UNSEEN_DAYS: f64 = 4.0;
 /// stand, .02 calls one in a hundred collapses fewer in time, and .001 one more, but rules hardly anything out.
 const NOT_UNLIKELY: f64 = 0.006;
 const NEAR_DAYS: f64 = 6.0;
-/// Steps of the distribution in one doubling of time.
-const STEPS: u32 = 8;
 /// The median velocity, mm/day, last read before a collapse (30 failures, Federico et al. 2012).
 const LAST_VELOCITY: f64 = 93.0;
 /// A slope whose newest velocity is under this share of its velocity over a span is the less likely to collapse within the
@@ -42,11 +41,6 @@ const SURVIVED: i32 = 2;
 /// taken off, as the first burst belongs to the same crisis. Set on drawn shapes of failure under measured noise: of 72, four more were red a day before, and of as
 /// many that stand no more.
 const ALL_BUT_SURE: f64 = 0.01;
-/// Spans before the one whose chance also counts within them, the power of time with which it grows, and how far readings are apart, days,
-/// where it does not count and where it does in full. Of 13,864 looks at drawn slopes read each week, the log score fell by a seventh.
-const FIRST_SPANS: usize = 2;
-const TO_COME: f64 = 1.5;
-const FAR_APART_DAYS: (f64, f64) = (1.0, 7.0);
 /// A slope at this velocity, mm/day, or under it, is the less likely to collapse within a span: the slowest of 30 slopes that collapsed was
 /// last read at .475 mm/day (Federico et al. 2012).
 const SLOW: f64 = 0.25;
@@ -151,8 +145,8 @@ impl Indicators {
         let are_far = self.scales.base_days > FAR_APART_DAYS.0;
         let first = if are_far { FIRST_SPANS } else { 0 };
         let mut counted = spans(&self.scales)
-            .take_while(|(power, span)| *power <= first || *span < 2.0 * days)
-            .map(|(_, span)| self.most(span));
+            .take_while(|span| span.power <= first || span.days < 2.0 * days)
+            .map(|span| self.most(span.days));
         let later = self.later.as_ref();
         counted.any(|most| most >= chance)
             || later.is_some_and(|(share, later)| later.may_reach(days, chance / share))
@@ -162,7 +156,7 @@ impl Indicators {
     /// The inputs of every span with its length, days.
     pub fn questions(&self, members: &Members) -> Vec<(f64, [f64; INPUTS])> {
         let each = spans(&self.scales);
-        each.map(|(power, days)| (days, self.inputs(members, power, days)))
+        each.map(|span| (span.days, self.inputs(members, span.power, span.days)))
             .collect()
     }
 
@@ -204,14 +198,15 @@ impl Indicators {
         let (mut reached, mut sure) = (0.0_f64, 0.0_f64);
         let (mut all, mut counted) = (Vec::new(), Vec::new());
         let accelerating = self.accelerating();
-        for (power, days) in spans(&self.scales) {
+        for AskedSpan { power, days, share } in spans(&self.scales) {
             let creeps = (1.0 - accelerating) * (1.0 - may_grow(&self.scales, power, days));
             let chance = network.chance(&self.inputs(members, power, days)) * (1.0 - creeps);
-            reached = reached.max(chance);
+            reached += share * (chance - reached).max(0.0);
             let goes_on = goes_on(&self.scales, power, accelerating);
-            sure = sure.max(self.most(days) * chance * goes_on);
-            all.push((days, reached));
-            counted.push((days, sure));
+            sure += share * (self.most(days) * chance * goes_on - sure).max(0.0);
+            let known = days * (share - 1.0).exp2();
+            all.push((known, reached));
+            counted.push((known, sure));
         }
         for chances in [&mut all, &mut counted] {
             between_far_readings(chances);
@@ -292,20 +287,6 @@ fn goes_on(scales: &Scales, power: usize, accelerating: f64) -> f64 {
     has_slowed.powf(unsure) * is_fast(scales, power)
 }
 
-/// The chances within the first spans no less than a hazard that grows as time to the power [`TO_COME`] has them, where readings are days
-/// apart: the records it was trained on ended at least one interval after the last evaluation, and slopes do not wait for the next reading.
-fn between_far_readings(chances: &mut [(f64, f64)]) {
-    let Some((days, chance)) = chances.get(FIRST_SPANS).copied() else {
-        return;
-    };
-    let (near, far) = FAR_APART_DAYS;
-    let counts = ((chances[0].0 - near) / (far - near)).clamp(0.0, 1.0);
-    for own in &mut chances[..FIRST_SPANS] {
-        let share = (own.0 / days).powf(TO_COME);
-        own.1 = own.1.max(counts * (1.0 - (1.0 - chance).powf(share)));
-    }
-}
-
 /// The share of the chance within the span of scale `power` that is left to a slope for its velocity, the highest now of that scale and the shorter
 /// ones.
 fn is_fast(scales: &Scales, power: usize) -> f64 {
@@ -341,60 +322,6 @@ fn growth(scales: &Scales, power: usize, span: f64) -> impl Iterator<Item = f64>
         let deviation = scale.near.usual.hypot(UNEVEN * expected);
         expected * (scale.near.newest - 0.5 * expected) / (deviation * deviation)
     })
-}
-
-/// `chances` within each span no less than `others` of the same spans.
-fn at_least(chances: &mut [(f64, f64)], others: &[(f64, f64)]) {
-    for (own, other) in chances.iter_mut().zip(others) {
-        own.1 = own.1.max(other.1);
-    }
-}
-
-fn spans(scales: &Scales) -> impl Iterator<Item = (usize, f64)> {
-    let base = scales.base_days;
-    let doubled = (0..scales.each.len() + BEYOND).scan(base, |days, power| {
-        let this = *days;
-        *days *= 2.0;
-        Some((power, this))
-    });
-    doubled.take_while(|(_, days)| *days <= LONGEST_DAYS)
-}
-
-/// From (days, chance within them), counted from where the newest velocity is centred. Between two of them the chance grows
-/// as the law has it, as far as the law puts the collapse there, and for the rest evenly with ln of time; before the first
-/// it grows with time.
-fn passage(within: &[(f64, f64)], law: &Passage, centred_before_days: f64) -> Passage {
-    let mut times = Vec::new();
-    let mut add =
-        |days: f64, share: f64| times.push(((days - centred_before_days).max(0.0), share));
-    let steps = f64::from(STEPS);
-    if let Some((days, chance)) = within.first() {
-        for step in 0..STEPS {
-            add(days * (f64::from(step) + 0.5) / steps, chance / steps);
-        }
-    }
-    let law: Vec<(f64, f64)> = law
-        .times()
-        .iter()
-        .map(|(days, share)| (days + centred_before_days, *share))
-        .collect();
-    for pair in within.windows(2) {
-        let ((from, before), (to, chance)) = (pair[0], pair[1]);
-        let first = law.partition_point(|(days, _)| *days <= from);
-        let last = law.partition_point(|(days, _)| *days <= to);
-        let laws = &law[first..last];
-        let by_the_law: f64 = laws.iter().map(|(_, share)| share).sum();
-        let grows = chance - before;
-        for (days, share) in laws {
-            add(*days, grows * share);
-        }
-        for step in 0..STEPS {
-            let way = (f64::from(step) + 0.5) / steps;
-            let even = grows * (1.0 - by_the_law).max(0.0) / steps;
-            add(from * (to / from).powf(way), even);
-        }
-    }
-    Passage::from_times(times)
 }
 
 /// What is seen from the scale of one span.

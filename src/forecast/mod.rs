@@ -16,6 +16,7 @@ mod passage;
 mod past_event;
 mod scales;
 mod sessions;
+mod spans;
 mod sudden;
 mod surprise;
 mod together;

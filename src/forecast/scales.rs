@@ -14,6 +14,8 @@ const FINEST_BLOCK_DAYS: f64 = 1.0 / 96.0;
 /// Blocks of one scale, and scales, at most: they bound the work whatever the length of the record.
 const MOST_BLOCKS: usize = 512;
 const MOST_SCALES: usize = 24;
+/// Fewest blocks of a scale.
+pub(super) const FEWEST_BLOCKS: usize = 3;
 /// Fewest readings.
 const FEWEST_READINGS: usize = 6;
 /// So many of the newest spans between readings say how a slope is read now, where they are shorter than this share of the usual one.
@@ -352,7 +354,7 @@ impl Blocks {
     /// What the blocks show; `None` where there are fewer than three. `shorter` is the scale below.
     fn scale(&self, shorter: Option<&Scale>, noise: ReadingNoise, curve: &Curve) -> Option<Scale> {
         let means = &self.means;
-        if means.len() < 3 {
+        if means.len() < FEWEST_BLOCKS {
             return None;
         }
         let prior = shorter.map(|scale| scale.near);
