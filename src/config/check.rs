@@ -324,6 +324,13 @@ fn slow_sampling(config: &Config) -> impl Iterator<Item = String> {
 }
 
 impl Config {
+    /// The names of the hooks for which alerts wait on purpose.
+    pub fn later_hooks(&self) -> Vec<String> {
+        let hooks = self.hooks.iter();
+        let later = hooks.filter(|hook| hook.waits_on_purpose());
+        later.map(HookConfig::name).collect()
+    }
+
     /// Has the hooks run in a sandbox by `program`, which must be this one, but for those that ask not to be.
     pub fn sandbox_hooks(&mut self, program: &Path) {
         for hook in self.hooks.iter_mut().filter(|hook| hook.sandbox) {
@@ -343,6 +350,11 @@ impl SiteConfig {
 }
 
 impl HookConfig {
+    /// Whether an alert waits before it is given to this hook: until nobody has acknowledged it for some time, or until people are on duty.
+    pub fn waits_on_purpose(&self) -> bool {
+        self.escalate_after.is_some() || self.hours.is_some()
+    }
+
     /// The table of the config that it stands in.
     pub fn table(&self) -> &'static str {
         self.to.as_ref().map_or("hook", |to| to.table())

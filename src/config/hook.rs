@@ -48,8 +48,7 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
 
 /// The outbox knows a hook by its command line: one that is run at once and again later needs two.
 fn unlike(root: &Section<'_>, hooks: &[HookConfig]) {
-    let later = |hook: &&HookConfig| hook.escalate_after.is_some() || hook.hours.is_some();
-    let later = hooks.iter().filter(later);
+    let later = hooks.iter().filter(|hook| hook.waits_on_purpose());
     for hook in later.filter(|hook| !hook.run.is_empty()) {
         if hooks.iter().filter(|one| one.run == hook.run).count() > 1 {
             root.error(

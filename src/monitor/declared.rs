@@ -78,6 +78,9 @@ pub(super) struct Declarations {
     /// Resets that the readings show and nobody has declared: when, and by what the readings jump, mm.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     found: Vec<(Timestamp, f64)>,
+    /// Spans whose readings are in another unit than those before and after: since when, and from when on they are not.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    left_out: Vec<(Timestamp, Timestamp)>,
 }
 
 impl Declarations {
@@ -93,6 +96,7 @@ impl Declarations {
             all,
             reported: Vec::new(),
             found: Vec::new(),
+            left_out: Vec::new(),
         }
     }
 
@@ -101,14 +105,20 @@ impl Declarations {
         self.found.last().copied()
     }
 
-    /// The newest reset that was found was none.
-    pub(super) fn forget_found(&mut self) {
-        self.found.pop();
-    }
-
     /// Takes a reset that the readings show: as of one that is declared, what they jump by is no motion.
     pub(super) fn find_reset(&mut self, time: Timestamp, jump: f64) {
         self.found.push((time, jump));
+    }
+
+    /// Readings of this span show nothing.
+    pub(super) fn leave_out(&mut self, since: Timestamp, until: Timestamp) {
+        self.left_out.push((since, until));
+    }
+
+    /// Whether a reading of that time is known to be in another unit.
+    pub(super) fn is_in_other_unit(&self, time: Timestamp) -> bool {
+        let mut spans = self.left_out.iter();
+        spans.any(|(since, until)| (*since..*until).contains(&time))
     }
 
     /// Takes these instead; `None` where they are the same.

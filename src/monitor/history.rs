@@ -146,10 +146,18 @@ impl History {
         before != self.observations.values
     }
 
+    /// When so many of the newest readings were taken, the first of them.
+    pub(super) fn first_of_newest(&self, count: usize) -> Option<Timestamp> {
+        let values = &self.observations.values;
+        let first = values.get(values.len().checked_sub(count)?)?;
+        self.time(first.t_days)
+    }
+
     /// Whether what is declared leaves a reading of that time out.
     pub(super) fn is_left_out(&self, declared: &Declarations, time: Timestamp) -> bool {
         let (from, to) = self.span(time);
         declared.is_maintained(time)
+            || declared.is_in_other_unit(time)
             || self.observations.quantity == Quantity::Velocity
                 && declared.is_reset_within(from, to)
     }

@@ -87,7 +87,15 @@ impl Dialect {
 
     /// The number that a cell holds, also `inf` and `NaN`: the caller refuses what is not finite.
     pub fn number(&self, cell: &str) -> Option<f64> {
-        let plain;
+        let (ascii, plain);
+        // Office programs write the minus sign of typography.
+        let cell = match cell.strip_prefix('\u{2212}') {
+            Some(digits) => {
+                ascii = format!("-{digits}");
+                &ascii
+            }
+            None => cell,
+        };
         let cell = match self.thousands {
             Some(mark) if mark.stands_in(cell) => {
                 plain = self.without_thousands(cell, mark)?;

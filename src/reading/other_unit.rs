@@ -28,7 +28,7 @@ const ROUNDED: f64 = 5.0;
 /// scatter far less. One change in fifty is missed for it, of those to a smaller unit.
 const SCATTERS: f64 = 0.5;
 /// So many readings back in the former unit, in a row, end it,
-const BACK: u32 = 4;
+pub const BACK: u32 = 4;
 /// which are those within this share of what the last one in the other unit was in the former.
 const NEAR_SHARE: f64 = 0.5;
 /// So many readings that range over a hundredth, say, of what the former ones did show it too, where these lie too near to zero for their

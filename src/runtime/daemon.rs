@@ -200,6 +200,9 @@ impl Daemon {
             vitals.quarantined(source, *more);
         }
         self.site.note_waiting(batch.waiting);
+        if !self.is_caught_up {
+            self.site.queue_backlog(batch.arrivals.len());
+        }
         let mut prepared = 0;
         for (number, arrival) in batch.arrivals.iter().enumerate() {
             if shutdown.is_requested() {
@@ -477,7 +480,8 @@ impl Daemon {
         self.verify();
         self.note_quarantined()?;
         self.keep_faults();
-        let ((outbox, oldest), bytes) = (self.store.outbox()?, self.store.bytes()?);
+        let (outbox, oldest) = self.store.outbox(&self.config.later_hooks())?;
+        let bytes = self.store.bytes()?;
         self.reporting.vitals.update(|health| {
             (health.outbox, health.outbox_oldest) = (outbox, oldest);
             health.database_bytes = Some(bytes);

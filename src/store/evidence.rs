@@ -85,19 +85,29 @@ impl Store {
         })
     }
 
-    /// How many deliveries wait, and when the oldest of their alerts was called.
+    /// How many deliveries wait, and when the oldest of their alerts was called; of those to the hooks of `later`, which wait on purpose, only where
+    /// one has been tried.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn outbox(&self) -> Result<(usize, Option<Timestamp>), StoreError> {
+    pub fn outbox(&self, later: &[String]) -> Result<(usize, Option<Timestamp>), StoreError> {
         let inner = self.inner();
-        let mut query = inner
-            .connection
-            .prepare_cached("SELECT count(*), min(time) FROM outbox WHERE status = 'waiting'")?;
-        let (count, oldest): (i64, Option<i64>) =
-            query.query_row([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        let mut query = inner.connection.prepare_cached(
+            "SELECT hook, attempts > 0, count(*), min(time) FROM outbox WHERE status = 'waiting' GROUP BY 1, 2",
+        )?;
+        let rows = query.query_map([], |row| {
+            Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
+        })?;
+        let (mut total, mut oldest) = (0, None);
+        for row in rows {
+            let (hook, is_tried, count, time): (String, bool, i64, i64) = row?;
+            total += count;
+            if is_tried || !later.contains(&hook) {
+                oldest = Some(oldest.map_or(time, |before: i64| before.min(time)));
+            }
+        }
         let oldest = oldest.map(timestamp).transpose()?;
-        Ok((usize::try_from(count).unwrap_or(0), oldest))
+        Ok((usize::try_from(total).unwrap_or(0), oldest))
     }
 
     /// Who is to get an alert, and how far that has come, in the order in which it was noted.

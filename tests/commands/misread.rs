@@ -58,6 +58,30 @@ fn a_unit_of_the_units_line_that_cannot_be_read_is_named_and_mm_is_not_proposed(
     }
 }
 
+/// As docs/failure-modes.md advises where a logger's unit changes.
+#[test]
+fn a_header_that_comes_again_with_another_unit_gives_the_same_benchmark_though_the_config_names_its_column()
+ {
+    let text = rows(20, |time, value| {
+        let again = if (time.day(), time.hour()) == (1, 10) {
+            "time,d_displacement_m\n"
+        } else {
+            ""
+        };
+        let value = if time.hour() < 10 {
+            value
+        } else {
+            value / 1000.0
+        };
+        format!("{again}{}Z,{value:.5}\n", time.strftime("%FT%T"))
+    });
+    let text = format!("time,d_displacement_mm\n{text}");
+    let more = "[[benchmark]]\nid = \"5\"\ncolumn = \"d_displacement_mm\"\n";
+    let office = Office::with(&[("a.csv", &text), ("site.toml", &site("a.csv", more))]);
+    let said = checked(&office);
+    contains_all(&said, &["benchmark 5 (logger): 20 readings", "9.5 mm"]);
+}
+
 #[test]
 fn a_header_that_comes_again_without_the_column_of_a_benchmark_is_a_warning() {
     let head = |name: &str, unit: &str| {

@@ -242,3 +242,42 @@ fn a_red_that_people_resolve_before_the_past_is_judged_stays_resolved_and_the_ne
     program.stop();
     site.proven_events();
 }
+
+/// What rows have come while the daemon was down is not judged row by row: the last one would have to wait for all.
+#[test]
+fn what_files_have_got_while_the_daemon_was_down_is_judged_for_its_newest() {
+    let site = Site::new(
+        "[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"100 mm\"\n\
+         [[hook]]\nrun = [\"/bin/sh\", \"-c\", \"echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> notified\"]\n",
+    );
+    let begins = clock::now() - SignedDuration::from_hours(40);
+    let row = |minute: i64, more: f64| {
+        let time = begins + SignedDuration::from_mins(minute);
+        let jitter = (minute * 37 % 11) as f64 / 50.0;
+        format!("{time},{:.3}\n", jitter + more)
+    };
+    let before: String = (0..60).map(|hour| row(20 * hour, 0.0)).collect();
+    site.append("incoming/5.csv", &format!("{HEADER}{before}"));
+    let program = site.caught_up();
+    eventually("that the past is judged", || {
+        site.log()
+            .contains("before the first start has been judged")
+    });
+    program.stop();
+    let known = refits(&site).len();
+    let down: String = (0..1100).map(|minute| row(1201 + minute, 0.0)).collect();
+    site.append("incoming/5.csv", &(down + &row(2390, 200.0)));
+    let program = site.caught_up();
+    eventually("the red of the last row", || {
+        site.lines("notified")
+            .iter()
+            .any(|line| line.starts_with("5/red/") && line.ends_with("firing"))
+    });
+    program.stop();
+    let refits = refits(&site).len() - known;
+    assert!(
+        (1..=110).contains(&refits),
+        "{refits} refits for 1101 readings"
+    );
+    site.proven_events();
+}

@@ -361,3 +361,59 @@ fn a_fall_that_no_slope_makes_is_a_reset_that_nobody_declared_and_a_spike_is_non
         0
     );
 }
+
+/// Hourly readings of a slope that creeps at 1 mm/day and collapses at the 330th hour, with what a function makes of each.
+fn to_a_collapse(read: impl Fn(usize, f64) -> f64) -> Vec<(Timestamp, f64)> {
+    let mut generator = Pcg64::seed_from_u64(5);
+    let mut moved = 30.0;
+    let readings = (0..325_i32).map(|hour| {
+        let left = f64::from(330 - hour.max(240));
+        moved += 0.04 + 15.0 * (1.0 / left - 1.0 / 90.0);
+        let noise = (0..12)
+            .map(|_| generator.random_range(0.0..1.0))
+            .sum::<f64>()
+            - 6.0;
+        let index = usize::try_from(hour).unwrap();
+        (start() + hour.hours(), read(index, moved + 0.1 * noise))
+    });
+    readings.collect()
+}
+
+fn first_red(readings: &[(Timestamp, f64)]) -> Option<Timestamp> {
+    let mut settings = Settings::default();
+    settings.policy.evacuation_time = 12.hours().try_into().unwrap();
+    let events = play(&mut Monitor::new(settings), readings, Unit::MM);
+    let red = events.into_iter().find(|event| {
+        matches!(
+            event.kind,
+            EventKind::Alert {
+                level: Level::Red,
+                ..
+            }
+        )
+    });
+    red.map(|event| event.time)
+}
+
+/// An offset that passes, or another unit that ends, hides no later acceleration.
+#[test]
+fn readings_that_were_wrong_for_a_while_delay_no_later_red() {
+    let as_read = first_red(&to_a_collapse(|_, value| value)).unwrap();
+    let is_wrong = |hour: usize| (200..210).contains(&hour);
+    for (what, wrong) in [
+        ("27 mm too low", (|value| value - 27.0) as fn(f64) -> f64),
+        ("300 mm too low", |value| value - 300.0),
+        ("in metres", |value| (100.0 * value).round() / 1e5),
+    ] {
+        let readings = to_a_collapse(
+            |hour, value| {
+                if is_wrong(hour) { wrong(value) } else { value }
+            },
+        );
+        let red = first_red(&readings).unwrap();
+        assert!(
+            red <= as_read + 6.hours(),
+            "{what}: {red}, and {as_read} without"
+        );
+    }
+}

@@ -210,8 +210,10 @@ impl Track {
     ) -> Vec<Event> {
         let mut events = Vec::new();
         // A state of an earlier version is judged again as it was.
-        if phase.holds_scale {
-            self.quality.look_at_unit(&self.record, source.unit);
+        if phase.holds_scale
+            && let Some(since) = self.quality.look_at_unit(&self.record, source.unit)
+        {
+            self.record.leave_out_other_unit(since);
         }
         if !self.quality.is_in_other_unit() {
             if !self.quality.is_accepted(Suspicion::Fall) {

@@ -240,9 +240,23 @@ impl Track {
             return events;
         };
         let benchmark = self.record.benchmark();
+        let place = format!("benchmark {benchmark}: {level}");
+        let called = events.iter().rev().find_map(|event| {
+            if let EventKind::Alert {
+                level: called,
+                text,
+                ..
+            } = &event.kind
+                && *called == level
+            {
+                text.strip_prefix(&place)
+            } else {
+                None
+            }
+        });
         let text = format!(
-            "benchmark {benchmark}: {level} since {since}, found in the readings from before it was watched; nothing since has \
-             ended it"
+            "{place} since {since}, found in the readings from before it was watched; nothing since has ended it{}",
+            called.unwrap_or_default()
         );
         let kind = EventKind::Alert {
             level,

@@ -1,7 +1,7 @@
 //! What the columns of a CSV file mean, by their names alone.
 
-use super::column_map::Measure;
-use super::names::{Name, channel_unit, is_unit_of_motion, name_of};
+use super::column_map::{ColumnMap, Measure};
+use super::names::{Name, channel_unit, in_unit_of, is_unit_of_motion, name_of};
 use super::{IngestError, ReadOptions, Remark};
 use crate::reading::{BenchmarkId, Dialect, Unit, in_brackets};
 use schemars::JsonSchema;
@@ -138,7 +138,7 @@ fn in_stated_unit(name: &str, named: Unit, benchmark: &BenchmarkId, unit: Unit) 
 }
 
 /// What a column of readings should have.
-const A_UNIT: &str = "a unit at its end: um, mm, cm, m, in or ft, a velocity per min, h, day or yr, such as displacement_mm or velocity_mm_per_h";
+const A_UNIT: &str = "a unit at its end: um, mm, cm, m, in or ft, a velocity per min, h, day or yr, such as displacement_mm or velocity_mm_per_h; or its unit stated, --column NAME=ID:QUANTITY:UNIT";
 
 /// A header, understood.
 #[derive(Debug, Clone)]
@@ -168,6 +168,16 @@ struct NamedColumns {
     remarks: Vec<Remark>,
     /// Benchmarks whose unit is not the one that their column's name has: that one, and theirs.
     restated: Vec<(BenchmarkId, Unit, Unit)>,
+    /// Columns that are stated by their names and are not there under these.
+    absent: Vec<ColumnMap>,
+}
+
+fn absent(names: &[String], options: &ReadOptions) -> Vec<ColumnMap> {
+    let stated = options.columns.iter();
+    stated
+        .filter(|map| !names.contains(&map.column))
+        .cloned()
+        .collect()
 }
 
 impl NamedColumns {
@@ -179,8 +189,11 @@ impl NamedColumns {
         stem: &BenchmarkId,
         options: &ReadOptions,
     ) -> Result<(), (&'static str, &'static str)> {
-        let map = options.columns.iter().find(|map| map.column == *name);
-        let measured = match map {
+        let mut stated = options.columns.iter();
+        let map = stated.find(|map| map.column == *name).cloned();
+        // A header that comes again says in which unit its readings are from there on.
+        let map = map.or_else(|| self.absent.iter().find_map(|one| in_unit_of(name, one)));
+        let measured = match &map {
             Some(map) => Ok((Some(map.benchmark.clone()), map.measure)),
             None => Layout::by_name(name, &options.dialect)?,
         };
@@ -253,7 +266,10 @@ impl Layout {
             expected,
         };
         let stem = BenchmarkId::new(file.file_stem().unwrap_or_default().to_string_lossy());
-        let mut named = NamedColumns::default();
+        let mut named = NamedColumns {
+            absent: absent(&names, options),
+            ..NamedColumns::default()
+        };
         for (index, name) in names.iter().enumerate() {
             Self::name_is_right(name, &names[..index])
                 .and_then(|()| named.take(name, &stem, options))

@@ -1,6 +1,6 @@
 //! What the name of a column says: whose readings it holds, or the unit of a covariate.
 
-use super::column_map::Measure;
+use super::column_map::{ColumnMap, Measure};
 use crate::reading::{Unit, in_brackets};
 
 /// What a column's name says.
@@ -50,6 +50,22 @@ pub fn unit_in_name(column: &str) -> Option<Unit> {
     } else {
         None
     }
+}
+
+/// The column `name` where it differs from that of `map` only by its unit, which is then that of the readings: where the name in `map` states a
+/// unit, and no other one is stated of it.
+pub(super) fn in_unit_of(name: &str, map: &ColumnMap) -> Option<ColumnMap> {
+    let (Name::Measure(own_id, Measure::Reading(own)), Name::Measure(id, Measure::Reading(unit))) =
+        (name_of(&map.column), name_of(name))
+    else {
+        return None;
+    };
+    let is_same = own_id == id && own.quantity() == unit.quantity();
+    (is_same && map.measure == Measure::Reading(own)).then(|| ColumnMap {
+        column: name.to_owned(),
+        benchmark: map.benchmark.clone(),
+        measure: Measure::Reading(unit),
+    })
 }
 
 fn measure_at(plain: &str, at: usize, keyword: &str) -> Option<Measure> {
@@ -114,6 +130,20 @@ pub(super) fn channel_unit(name: &str) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_column_that_is_named_by_another_unit_is_the_same_in_that_unit() {
+        let map: ColumnMap = "d_displacement_mm=5:displacement:mm".parse().unwrap();
+        let in_metres = in_unit_of("d_displacement_m", &map).unwrap();
+        assert_eq!(in_metres.benchmark, map.benchmark);
+        let metres = Unit::parse("m").unwrap();
+        assert_eq!(in_metres.measure, Measure::Reading(metres));
+        for other in ["e_displacement_m", "d_velocity_m_per_day", "d"] {
+            assert_eq!(in_unit_of(other, &map), None, "{other}");
+        }
+        let restated: ColumnMap = "d_displacement_mm=5:displacement:cm".parse().unwrap();
+        assert_eq!(in_unit_of("d_displacement_m", &restated), None);
+    }
 
     #[test]
     fn a_name_says_benchmark_quantity_and_unit() {

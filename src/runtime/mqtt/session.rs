@@ -156,8 +156,8 @@ impl Session {
         let link = match &mut self.link {
             Some(link) => link,
             none => {
-                let client = (self.client_id.as_str(), self.is_kept);
-                none.insert(open(self.version, &self.broker, client).await?)
+                let (broker, id) = (&self.broker, &self.client_id);
+                none.insert(open(self.version, broker, id, self.is_kept).await?)
             }
         };
         let came = match link {
@@ -232,13 +232,14 @@ impl Session {
 async fn open(
     version: Version,
     broker: &Broker,
-    client: (&str, bool),
+    client_id: &str,
+    is_kept: bool,
 ) -> Result<Link, NoConnection> {
     let transport = transport(&broker.address, broker.ca_file.as_deref())?;
     let to = (host_of(&broker.address).await?, broker.address.port);
     Ok(match version {
-        Version::Five => five(broker, to, client, transport),
-        Version::Three => three(broker, to, client, transport),
+        Version::Five => five(broker, to, client_id, is_kept, transport),
+        Version::Three => three(broker, to, client_id, is_kept, transport),
     })
 }
 
@@ -270,9 +271,14 @@ pub(super) fn transport(
     Ok(Transport::tls_with_config(TlsConfiguration::Rustls(config)))
 }
 
-fn five(broker: &Broker, to: (String, u16), client: (&str, bool), transport: Transport) -> Link {
+fn five(
+    broker: &Broker,
+    to: (String, u16),
+    client_id: &str,
+    is_kept: bool,
+    transport: Transport,
+) -> Link {
     let address = &broker.address;
-    let (client_id, is_kept) = client;
     let mut options = v5::MqttOptions::new(client_id, to.0, to.1);
     options
         .set_clean_start(!is_kept)
@@ -289,9 +295,14 @@ fn five(broker: &Broker, to: (String, u16), client: (&str, bool), transport: Tra
     Link::Five(client, Box::new(connection))
 }
 
-fn three(broker: &Broker, to: (String, u16), client: (&str, bool), transport: Transport) -> Link {
+fn three(
+    broker: &Broker,
+    to: (String, u16),
+    client_id: &str,
+    is_kept: bool,
+    transport: Transport,
+) -> Link {
     let address = &broker.address;
-    let (client_id, is_kept) = client;
     let mut options = v3::MqttOptions::new(client_id, to.0, to.1);
     options
         .set_clean_session(!is_kept)

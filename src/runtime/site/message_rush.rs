@@ -1,5 +1,5 @@
-//! What comes faster than it can be judged: many messages at once, which are a broker's backlog (on a first start they belong to the
-//! past, later they are judged together), and the history of a benchmark that begins while others are watched.
+//! What comes faster than it can be judged: many messages at once, which are a broker's backlog, and what files have got while the daemon was not
+//! running (on a first start they belong to the past, later they are judged together), and the history of a benchmark that begins while others are watched.
 
 use super::Site;
 use crate::monitor::{Event, Input, Notice};
@@ -55,7 +55,20 @@ impl Site {
 
     /// Where messages come faster than they can be judged, what they hold from here on is judged at [`Site::end_batch`].
     pub fn queue(&mut self) {
-        if self.monitor.queues() || self.monitor.reads_all_past() || !self.is_rush() {
+        if self.is_rush() {
+            self.begin_queue();
+        }
+    }
+
+    /// So many values of files have come together while the daemon was not running: where they are many, they are judged at [`Site::end_batch`].
+    pub fn queue_backlog(&mut self, values: usize) {
+        if values >= MANY {
+            self.begin_queue();
+        }
+    }
+
+    fn begin_queue(&mut self) {
+        if self.monitor.queues() || self.monitor.reads_all_past() {
             return;
         }
         self.rush.queues = Some((Stopwatch::start(), self.counts.taken));

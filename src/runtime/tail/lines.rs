@@ -53,6 +53,10 @@ pub struct Lines {
     /// Whether the line that is held has been returned.
     #[serde(default)]
     is_returned: bool,
+    /// Whether NUL bytes stand before the line that is held: a block that was not synced before the power failed, or the hole that a writer leaves
+    /// who goes on where he was after the file was truncated. They take nothing from what is written behind them.
+    #[serde(default)]
+    is_behind_nul: bool,
 }
 
 impl Lines {
@@ -153,7 +157,12 @@ impl Lines {
         self.is_unended() && !self.is_returned
     }
 
-    fn hold(&mut self, bytes: &[u8]) {
+    fn hold(&mut self, mut bytes: &[u8]) {
+        if self.partial.is_empty() && !self.too_long {
+            let nul = bytes.iter().take_while(|byte| **byte == 0).count();
+            self.is_behind_nul |= nul > 0;
+            bytes = &bytes[nul..];
+        }
         if self.too_long || self.partial.len() + bytes.len() > LONGEST_LINE {
             self.too_long = true;
             self.partial = Vec::new();
@@ -165,9 +174,10 @@ impl Lines {
     fn complete(&mut self) -> TailLine {
         self.number += 1;
         let bytes = std::mem::take(&mut self.partial);
+        let is_nul_alone = std::mem::take(&mut self.is_behind_nul) && bytes.is_empty();
         let text = if std::mem::take(&mut self.too_long) {
             Err(LineFault::TooLong)
-        } else if bytes.contains(&0) {
+        } else if is_nul_alone || bytes.contains(&0) {
             Err(LineFault::Nul)
         } else {
             String::from_utf8(bytes).map_err(|error| LineFault::NotUtf8 {
@@ -253,6 +263,21 @@ mod tests {
         assert_eq!(got[4].text.as_deref(), Ok("c"));
         assert!(matches!(got[1].text, Err(LineFault::NotUtf8 { .. })));
         assert_eq!(got[3].text, Err(LineFault::Nul));
+    }
+
+    #[test]
+    fn what_stands_behind_nul_bytes_is_read() {
+        let mut lines = Lines::default();
+        let mut text = b"a\n".to_vec();
+        text.extend(vec![0; 3 * LONGEST_LINE]);
+        text.extend(b"1,2\n3,4\n5\0,6\n");
+        let got: Vec<TailLine> = text
+            .chunks(1000)
+            .flat_map(|part| lines.feed(part))
+            .collect();
+        let (last, others) = got.split_last().unwrap();
+        assert_eq!(texts(others.to_vec()), ["a", "1,2", "3,4"]);
+        assert_eq!(last.text, Err(LineFault::Nul));
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use super::{Alarm, BesideForecast};
 use crate::alert::{
-    AlertCause, AlertEvidence, Entered, Level, Policy, RedCourse, Transition, chance_in_words,
-    hours_in_words,
+    AlertCause, AlertEvidence, Entered, Level, Policy, RedCourse, Transition, percent_in_words,
+    span_in_words,
 };
 use crate::forecast::HORIZON_DAYS;
 use crate::monitor::event::{AlertState, CalledLevel, Event, EventKind, LevelChance};
@@ -214,10 +214,10 @@ fn text(
             format!("; velocity {} mm/day", figure(velocity, 3))
         });
     let grounds = grounds(policy, evidence, &change.rule);
-    let chance = |name: &str, chance: Option<f64>, span: &str| {
+    let chance = |chance: Option<f64>, span: SignedDuration, name: &str| {
         chance.map_or_else(String::new, |chance| {
-            let chance = chance_in_words(chance);
-            format!("; chance {chance} within {name} ({span})")
+            let (chance, span) = (percent_in_words(chance), span_in_words(span));
+            format!("; chance of collapse {chance} within {span} ({name})")
         })
     };
     let is_pending = change.level == Level::Orange && evidence.red == RedCourse::IsNear;
@@ -226,27 +226,24 @@ fn text(
     } else {
         String::new()
     };
-    let (mut outlook, mut ahead_of_outlook) = ("the outlook", hours_in_words(ahead.orange));
-    if ahead.orange < policy.outlook {
-        outlook = "five times the record's length";
-        ahead_of_outlook += ", shorter than the outlook of ";
-        ahead_of_outlook += &hours_in_words(policy.outlook);
-    }
+    let of_outlook = if ahead.orange < policy.outlook {
+        let outlook = span_in_words(policy.outlook);
+        format!("five times the record's length, shorter than the outlook of {outlook}")
+    } else {
+        "the outlook".to_owned()
+    };
+    let of_red = format!(
+        "{} and until the next reading",
+        policy.red_within_in_words()
+    );
     format!(
-        "benchmark {}: {}{verb} ({}){grounds}{}{pending}{}{velocity}; the critical velocity is {} mm/day",
+        "benchmark {}: {}{verb}{grounds}{}{pending}{}{velocity}; critical velocity {} mm/day; rule {}",
         record.benchmark(),
         change.level,
-        change.rule,
-        chance(
-            &format!(
-                "{} and until the next reading",
-                policy.red_within_in_words()
-            ),
-            evidence.chance_for_red,
-            &hours_in_words(ahead.red)
-        ),
-        chance(outlook, evidence.chance_within_outlook, &ahead_of_outlook),
+        chance(evidence.chance_for_red, ahead.red, &of_red),
+        chance(evidence.chance_within_outlook, ahead.orange, &of_outlook),
         shortest(policy.critical_velocity_mm_per_day),
+        change.rule,
     )
 }
 

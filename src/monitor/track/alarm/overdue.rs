@@ -3,7 +3,7 @@
 
 use super::Alarm;
 use super::call::alert_of;
-use crate::alert::{AlertEvidence, Level, Policy, chance_in_words, hours_in_words};
+use crate::alert::{AlertEvidence, Level, Policy, percent_in_words, span_in_words};
 use crate::monitor::event::Event;
 use crate::monitor::kept::KeptForecast;
 use crate::monitor::track::forecast::Forecast;
@@ -107,13 +107,13 @@ impl Alarm {
         let change = self.latch.raise(policy, &evidence)?;
         self.levels.note(now, &self.latch);
         let text = format!(
-            "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {} within {} ({}) from {until:.0} on",
+            "benchmark {}: {}; no reading since {newest}; if no collapse has come since, chance of collapse {} within {} ({}) from {until:.0} on; rule {}",
             record.benchmark(),
             change.level,
-            change.rule,
-            chance_in_words(chance),
+            percent_in_words(chance),
+            span_in_words(policy.red_within()),
             policy.red_within_in_words(),
-            hours_in_words(policy.red_within())
+            change.rule,
         );
         Some(alert_of(record, now, &change, text))
     }

@@ -74,24 +74,32 @@ impl DataQuality {
         events
     }
 
-    /// After the newest reading: whether the readings are in another unit from some time on.
-    pub(in crate::monitor::track) fn look_at_unit(&mut self, record: &BenchmarkRecord, unit: Unit) {
+    /// After the newest reading: whether the readings are in another unit from some time on. Since when they were, where they no longer are: the
+    /// newest [`other_unit::BACK`] are in the former one.
+    pub(in crate::monitor::track) fn look_at_unit(
+        &mut self,
+        record: &BenchmarkRecord,
+        unit: Unit,
+    ) -> Option<Timestamp> {
         let stood = self.other_unit.take().filter(OtherUnit::is_confirmed);
         if self.is_accepted(Suspicion::Scale) {
-            return;
+            return None;
         }
         let history = record.history();
+        let mut ended = None;
         let found = match stood {
             Some(mut stands) => {
                 let newest = history.with_resets(unit, 1);
                 let mut newest = newest.iter().map(|(_, value)| value * unit.factor());
                 let goes_on = newest.all(|value| stands.goes_on(value));
+                ended = (!goes_on).then(|| stands.at());
                 goes_on.then_some(stands)
             }
             None => newly_in_other_unit(history, unit),
         };
         self.other_unit = found
             .filter(|other| !(other.may_be_a_reset() && history.is_reset_since(other.before())));
+        ended
     }
 
     /// Whether the newest reading came while its time lay ahead of the clock, which said `clock`.

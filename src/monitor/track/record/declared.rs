@@ -4,6 +4,7 @@ use super::BenchmarkRecord;
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::{Event, RESET_FOUND, RESET_RETURNED};
 use crate::monitor::history::MeasuredAs;
+use crate::reading::other_unit::BACK;
 use crate::reading::{Reading, Timestamp, figure};
 
 impl BenchmarkRecord {
@@ -46,6 +47,15 @@ impl BenchmarkRecord {
         Some(events.collect())
     }
 
+    /// The readings have been in another unit from `since` on and are in the former one again: what was read between is left out, as it would hide a
+    /// later acceleration.
+    pub(in crate::monitor::track) fn leave_out_other_unit(&mut self, since: Timestamp) {
+        if let Some(until) = self.history.first_of_newest(BACK as usize) {
+            self.declared.leave_out(since, until);
+            self.history.sort_out(&self.declared);
+        }
+    }
+
     /// Takes what the readings jump by at declared resets off them.
     pub(in crate::monitor::track) fn reset(&mut self, now: Timestamp) -> Vec<Event> {
         let mut events = Vec::new();
@@ -60,16 +70,17 @@ impl BenchmarkRecord {
     }
 
     /// Takes off a fall too large for a slope that moves upslope and that the newest readings confirm: a reset that nobody declared. Where they come
-    /// back it is put on again.
+    /// back that is a second one: neither the fall nor the return is motion, which would hide a later acceleration.
     pub(in crate::monitor::track) fn find_reset(&mut self, now: Timestamp) -> Option<Event> {
-        if let Some(found) = self.declared.newest_found()
-            && self.history.has_come_back(found)
+        if let Some((since, jump)) = self.declared.newest_found()
+            && let Some(newest) = self.history.newest()
+            && self.history.has_come_back((since, jump))
         {
-            self.declared.forget_found();
-            self.history.sort_out(&self.declared);
+            self.declared.find_reset(newest, -jump);
+            self.history.reset(&self.declared);
             let text = format!(
-                "benchmark {}: its readings came back by what they had fallen at {}: an offset that has passed, no reset",
-                self.benchmark, found.0
+                "benchmark {}: its readings came back by what they had fallen at {since}: an offset that has passed, no reset",
+                self.benchmark
             );
             return Some(self.fault(now, RESET_RETURNED, text));
         }
