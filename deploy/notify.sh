@@ -5,7 +5,12 @@
 # With a file's name as argument the line is appended there.
 set -eu
 cat >/dev/null  # a hook may leave stdin unread; a real one reads the JSON here
-line="[$SLIPWATCH_STATUS] $SLIPWATCH_SITE: $SLIPWATCH_LEVEL $SLIPWATCH_STATE at benchmark ${SLIPWATCH_BENCHMARK:-(site)}, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+, failure expected $SLIPWATCH_FAILURE_TIME}${SLIPWATCH_TEXT:+. $SLIPWATCH_TEXT}"
+case $SLIPWATCH_STATE in
+firing) state=called ;;
+resolved) state=ended ;;
+*) state=corrected ;;
+esac
+line="[$SLIPWATCH_STATUS] $SLIPWATCH_SITE: $SLIPWATCH_LEVEL $state at benchmark ${SLIPWATCH_BENCHMARK:-(site)}, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+, collapse forecast (median) $SLIPWATCH_FAILURE_TIME}${SLIPWATCH_TEXT:+. $SLIPWATCH_TEXT}${SLIPWATCH_RECOMMENDED:+. $SLIPWATCH_RECOMMENDED}"
 if [ $# -gt 0 ]; then
     echo "$line" >>"$1"
 else

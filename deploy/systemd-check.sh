@@ -96,11 +96,11 @@ tail -20 "$folder/all/readings.csv" >>"$root/srv/slipwatch/incoming/p1.csv"
 delivered() { inside slipwatch alerts list --config $site --format json; }
 is_red() { delivered | grep -q '"red"'; }
 soon is_red || fail "no red"
-soon logged 'red firing at benchmark P1' || fail "the hook has not said red"
+soon logged 'red called at benchmark P1' || fail "the hook has not said red"
 echo "ok: a red from a growing file, through the hook"
 
 # What the hook was given by now, by its key; a restart gives none of it again.
-given() { inside journalctl -u slipwatch --no-pager -o cat | grep -c 'firing at benchmark' || true; }
+given() { inside journalctl -u slipwatch --no-pager -o cat | grep -c 'called at benchmark' || true; }
 sleep 2
 before=$(given)
 restarts=$(property NRestarts)

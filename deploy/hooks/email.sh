@@ -23,6 +23,11 @@ if [ "${SLIPWATCH_COUNT:-1}" -gt 1 ]; then
     place="$SLIPWATCH_COUNT benchmarks"
 fi
 site=$(plain "$SLIPWATCH_SITE")
+case $SLIPWATCH_STATE in
+firing) state=called ;;
+resolved) state=ended ;;
+*) state=corrected ;;
+esac
 # A header holds ASCII alone (RFC 2047).
 encoded() {
     case $1 in
@@ -32,18 +37,24 @@ encoded() {
 }
 {
     printf 'To: %s\n' "${recipients%, }"
-    printf 'Subject: %s\n' "$(encoded "[$SLIPWATCH_STATUS] $site: $SLIPWATCH_LEVEL $SLIPWATCH_STATE at $place")"
+    printf 'Subject: %s\n' "$(encoded "[$SLIPWATCH_STATUS] $site: $SLIPWATCH_LEVEL $state at $place")"
     printf 'MIME-Version: 1.0\nContent-Type: text/plain; charset=utf-8\nContent-Transfer-Encoding: 8bit\n'
     # The same at each attempt: a mail program shows a repetition as what it is.
     printf 'X-Slipwatch-Key: %s\n\n' "$(encoded "$(plain "$SLIPWATCH_KEY")")"
-    printf '%s: %s (%s) at %s since %s\n' "$site" "$SLIPWATCH_LEVEL" "$SLIPWATCH_STATE" "$place" "$SLIPWATCH_TIME"
+    printf '%s: %s %s at %s, %s\n' "$site" "$SLIPWATCH_LEVEL" "$state" "$place" "$SLIPWATCH_TIME"
+    if [ -n "${SLIPWATCH_TEXT:-}" ]; then
+        printf '\n%s.\n' "$(plain "$SLIPWATCH_TEXT")"
+    fi
+    if [ -n "${SLIPWATCH_RECOMMENDED:-}" ]; then
+        printf '\nWhat to do: %s\n\n' "$(plain "$SLIPWATCH_RECOMMENDED")"
+    fi
     if [ -n "${SLIPWATCH_FAILURE_TIME:-}" ]; then
-        printf 'median forecast of the collapse: %s\n' "$SLIPWATCH_FAILURE_TIME"
+        printf 'Collapse forecast (median): %s\n' "$SLIPWATCH_FAILURE_TIME"
     fi
     if [ -n "${SLIPWATCH_ACKNOWLEDGE_URL:-}" ]; then
-        printf 'acknowledge it, once: %s\n' "$(plain "$SLIPWATCH_ACKNOWLEDGE_URL")"
+        printf 'To acknowledge (the link works once): %s\n' "$(plain "$SLIPWATCH_ACKNOWLEDGE_URL")"
     fi
-    printf 'attempt %s, key %s\n\n' "$SLIPWATCH_ATTEMPT" "$(plain "$SLIPWATCH_KEY")"
+    printf 'Attempt %s, key %s. All figures:\n\n' "$SLIPWATCH_ATTEMPT" "$(plain "$SLIPWATCH_KEY")"
     # A mailer may refuse a line of more than 998 octets (RFC 5322): Exim bounces it after it has taken the message.
-    sed 's/,"/,\n"/g' | fold -b -s -w 900
-} | "$mailer" -t -i
+    sed 's/,"/,\n"/g'
+} | fold -b -s -w 900 | "$mailer" -t -i

@@ -20,6 +20,11 @@ place=$(plain "${SLIPWATCH_BENCHMARK:-(site)}")
 if [ "${SLIPWATCH_COUNT:-1}" -gt 1 ]; then
     place="$SLIPWATCH_COUNT benchmarks"
 fi
+case $SLIPWATCH_STATE in
+firing) state=called ;;
+resolved) state=ended ;;
+*) state=corrected ;;
+esac
 # A header holds ASCII alone (RFC 2047).
 encoded() {
     case $1 in
@@ -27,8 +32,8 @@ encoded() {
     *) printf '%s' "$1" ;;
     esac
 }
-title="[$SLIPWATCH_STATUS] $(plain "$SLIPWATCH_SITE"): $SLIPWATCH_LEVEL $SLIPWATCH_STATE"
-text="$place, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+; median forecast of the collapse $SLIPWATCH_FAILURE_TIME}${SLIPWATCH_TEXT:+. $SLIPWATCH_TEXT}"
+title="[$SLIPWATCH_STATUS] $(plain "$SLIPWATCH_SITE"): $SLIPWATCH_LEVEL $state"
+text="$place, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+; collapse forecast (median) $SLIPWATCH_FAILURE_TIME}${SLIPWATCH_TEXT:+. $SLIPWATCH_TEXT}${SLIPWATCH_RECOMMENDED:+. $SLIPWATCH_RECOMMENDED}"
 token_file="$(dirname "$0")/ntfy.token"
 if [ -r "$token_file" ]; then
     # Over standard input: the command line can be read by everyone on the machine.

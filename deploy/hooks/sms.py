@@ -27,11 +27,19 @@ import sys
 import termios
 import time
 import tty
+import unicodedata
 
 ANSWER_S = 20.0
 # A letter that needs two places in the letters of a modem, such as a bracket, makes a message of 160 two messages.
 LONGEST = 150
 ESCAPE = b"\x1b"
+STATES = {"firing": "", "resolved": " ended"}
+TO_DO = {
+    "red": "EVACUATE by the plan",
+    "orange": "PREPARE to evacuate",
+    "yellow": "Look at the slope",
+    "unknown": "NOT WATCHED: watch by other means",
+}
 
 
 class Refused(Exception):
@@ -71,24 +79,40 @@ def opened(path):
     return modem
 
 
+def plain(text):
+    """Letters that every modem has: without accents, and without what begins a new line."""
+    apart = unicodedata.normalize("NFKD", text)
+    letters = "".join(letter for letter in apart if not unicodedata.combining(letter))
+    letters = letters.encode("ascii", "replace").decode()
+    return "".join(letter if letter.isprintable() else " " for letter in letters)
+
+
+def minute(time):
+    """2017-06-07 03:00 UTC of 2017-06-07T03:00:00Z."""
+    return f"{time[:16].replace('T', ' ')} UTC" if time.endswith("Z") else time
+
+
 def message(environment, alert):
-    """What fits into one message, in letters that every modem has."""
-    place = environment.get("SLIPWATCH_BENCHMARK") or "site"
+    """What fits into one message: what it is, where, and what to do come first."""
+    place = environment.get("SLIPWATCH_BENCHMARK") or "the whole site"
     # One message may stand for many benchmarks.
     count = int(environment.get("SLIPWATCH_COUNT") or 1)
     if count > 1:
         place = f"{count} benchmarks"
-    words = [
-        f"[{environment['SLIPWATCH_STATUS']}]",
-        f"{environment['SLIPWATCH_SITE']}:",
-        environment["SLIPWATCH_LEVEL"].upper(),
-        environment["SLIPWATCH_STATE"],
-        f"at {place},",
-        environment["SLIPWATCH_TIME"],
-    ]
-    words.append(alert.get("text", ""))
-    text = " ".join(words).encode("ascii", "replace").decode()
-    return "".join(letter if letter.isprintable() else " " for letter in text)[:LONGEST]
+    level, status = environment["SLIPWATCH_LEVEL"], environment["SLIPWATCH_STATUS"]
+    state = environment["SLIPWATCH_STATE"]
+    words = [] if status == "Actual" else [f"{status.upper()}, do not act on this:"]
+    words.append(f"{level.upper()}{STATES.get(state, ' corrected')}:")
+    words.append(f"{environment['SLIPWATCH_SITE']}, {place}.")
+    if state == "firing" and level in TO_DO:
+        words.append(f"{TO_DO[level]}.")
+    forecast = environment.get("SLIPWATCH_FAILURE_TIME")
+    if forecast:
+        words.append(f"Collapse forecast {minute(forecast)}.")
+    # The place and the level stand above already.
+    _, _, figures = alert.get("text", "").partition("; ")
+    words.append(f"At {minute(environment['SLIPWATCH_TIME'])}{': ' if figures else ''}{figures}")
+    return plain(" ".join(words))[:LONGEST].rstrip()
 
 
 def main():

@@ -1,6 +1,6 @@
 //! What each level asks people to do, in words; the site's own emergency plan says how.
 
-use super::chance::hours_in_words;
+use super::chance::span_in_words;
 use super::evidence::AlertCause;
 use super::level::Level;
 use super::policy::Policy;
@@ -41,7 +41,7 @@ impl Policy {
         format!(
             ", which calls red once it is {} in the mean over some {}",
             rounded(self.red_mean_chance()),
-            hours_in_words(self.red_course())
+            span_in_words(self.red_course())
         )
     }
 
@@ -50,7 +50,7 @@ impl Policy {
             "chance of collapse of {} or more within {} ({}) and until the next reading",
             self.red_chance,
             self.red_within_in_words(),
-            hours_in_words(self.red_within())
+            span_in_words(self.red_within())
         )
     }
 
@@ -70,13 +70,13 @@ impl Policy {
                 self.chance_for_red_in_words(),
                 rounded(self.red_near_chance()),
                 rounded(self.red_mean_chance()),
-                hours_in_words(self.red_course())
+                span_in_words(self.red_course())
             ),
             (RED_CHANCE, _) => format!(
                 "{}, and of {} or more in the mean over some {}, or of {} at one reading",
                 self.chance_for_red_in_words(),
                 rounded(self.red_mean_chance()),
-                hours_in_words(self.red_course()),
+                span_in_words(self.red_course()),
                 rounded(self.red_at_once())
             ),
             ("chance-within-outlook", level) => {
@@ -87,7 +87,7 @@ impl Policy {
                 };
                 format!(
                     "chance of collapse of {chance} or more within the outlook of {}",
-                    hours_in_words(self.outlook)
+                    span_in_words(self.outlook)
                 )
             }
             ("velocity-threshold", _) => format!(
@@ -125,7 +125,7 @@ mod tests {
              0.198 or more in the mean over some 12 h, or of 0.597 at one reading"
         );
         let outlook = |level| condition("chance-within-outlook", level);
-        assert!(outlook(Level::Orange).contains("of 0.7 or more within the outlook of 720 h"));
+        assert!(outlook(Level::Orange).contains("of 0.7 or more within the outlook of 30 days"));
         assert!(outlook(Level::Yellow).contains("of 0.3 or more"));
         assert_eq!(policy.condition("velocity-threshold", Level::Red), None);
         assert_eq!(policy.condition("no-data", Level::Unknown), None);

@@ -27,11 +27,17 @@ pub fn percent_in_words(chance: f64) -> String {
     }
 }
 
-/// `24 h`, `1.5 h`, `25 min`.
-pub fn hours_in_words(span: SignedDuration) -> String {
+/// From so many days on a span of whole days is written in days.
+const IN_DAYS: i64 = 5;
+const MINUTES_PER_DAY: i64 = 24 * 60;
+
+/// `30 days`, `24 h`, `1.5 h`, `25 min`.
+pub fn span_in_words(span: SignedDuration) -> String {
     let minutes = span.as_secs() / 60;
     if minutes < 60 {
         format!("{minutes} min")
+    } else if minutes % MINUTES_PER_DAY == 0 && minutes >= IN_DAYS * MINUTES_PER_DAY {
+        format!("{} days", minutes / MINUTES_PER_DAY)
     } else if minutes % 60 == 0 {
         format!("{} h", minutes / 60)
     } else {
@@ -45,7 +51,7 @@ mod tests {
 
     #[test]
     fn a_span_is_written_in_hours_and_in_minutes_below_one() {
-        let words = |minutes| hours_in_words(SignedDuration::from_mins(minutes));
+        let words = |minutes| span_in_words(SignedDuration::from_mins(minutes));
         assert_eq!(words(25), "25 min");
         assert_eq!(words(90), "1.5 h");
         assert_eq!(words(48 * 60), "48 h");

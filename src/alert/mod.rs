@@ -12,7 +12,7 @@ mod level;
 mod policy;
 mod rules;
 
-pub use chance::{chance_in_words, hours_in_words, percent_in_words};
+pub use chance::{chance_in_words, percent_in_words, span_in_words};
 pub use declared::{Combination, Condition, DeclaredRule};
 pub use evidence::{AlertCause, AlertEvidence, RedCourse};
 pub use held::Held;

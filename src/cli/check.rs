@@ -30,7 +30,7 @@ pub(super) struct Args {
 
 /// What has no source.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: without a source, see the warnings: {}", config.display(), what.join(", "))]
+#[error("{}: nothing is read of {}; see the warnings", config.display(), what.join(", "))]
 struct Unwatched {
     config: PathBuf,
     what: Vec<String>,

@@ -10,6 +10,7 @@ use super::problem::Problem;
 use super::refit::Fitted;
 use super::rival::Rival;
 use super::search::{Accepted, Refitted, Search};
+use crate::reading::{Channel, CovariateKind};
 
 /// Of heat and melt, days.
 const DAILY: [f64; 2] = [1.0, 0.5];
@@ -20,6 +21,20 @@ const UNEVEN: f64 = 0.5;
 /// Said where the day may be what comes and goes.
 pub(super) const REMARK: &str = "A tide explains these readings, and a cycle of the day of 24 hours explains them about as well: warmth, melt water and \
     the sun's own tides all have one. A record of the temperature, or a longer one, can show which it is.";
+
+/// Said of a tide of which a part may be the day's.
+const OF_BOTH: &str = "The strongest wave of the tide has a period of the sun's day, which warmth and melt water have too: how much of it is the tide's \
+    is open.";
+const WHAT_SHOWS_IT: &str = " A record of the temperature, or a longer one, can show it.";
+
+/// What is said of a tide whose strongest wave may be a daily one, beside these channels.
+pub(super) fn of_both(channels: &[Channel]) -> String {
+    let has_temperature = channels
+        .iter()
+        .any(|channel| channel.kind() == CovariateKind::Temperature);
+    let more = if has_temperature { "" } else { WHAT_SHOWS_IT };
+    format!("{OF_BOTH}{more}")
+}
 
 /// What else comes and goes with the day: melt water in the ground, and warmth in the instrument.
 pub(super) fn rivals() -> [Rival; 2] {

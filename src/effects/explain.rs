@@ -199,8 +199,10 @@ fn look(
     };
     let verdict = conclude(&ready, &mut found, options, &mut scratch);
     let withheld = found.withheld;
-    if found.is_daily || has_daily_tide(&verdict.effects, &ready.problem) {
+    if found.is_daily {
         remarks.push(daily::REMARK.to_owned());
+    } else if has_daily_tide(&verdict.effects, &ready.problem) {
+        remarks.push(daily::of_both(channels));
     }
     let findings = findings(&ready, found, verdict, options, &mut scratch);
     remarks.extend(forms::left_open(&findings, options.bic_margin));

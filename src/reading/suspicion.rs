@@ -2,7 +2,7 @@
 //! reset that nobody declared.
 
 use super::resolution::is_whole;
-use super::{Quantity, Timestamp, figure, upper_median, whole_figure};
+use super::{Quantity, Timestamp, counted, figure, upper_median, whole_figure};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -271,10 +271,11 @@ fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, DatedSuspicion)> {
     let is_leap = scatter(&others)
         .is_some_and(|(usual, scatter)| (value - before - usual).abs() > LEAP * scatter);
     let mut marked = readings.iter().filter(|(_, other)| same(*other, value));
-    let (count, at) = (marked.clone().count(), marked.next_back()?.0);
+    let count = counted(marked.clone().count() as u64, "time", "times");
+    let at = marked.next_back()?.0;
     (away > AWAY * (high - low) || is_leap).then(|| {
         let text = format!(
-            "{value} stands {count} times, first at {first}, and all other readings lie between {} and {}: \
+            "{value} stands {count}, first at {first}, and all other readings lie between {} and {}: \
              if it means that there is no value, add missing = [{value}] to the source",
             whole_figure(low),
             whole_figure(high)

@@ -361,7 +361,7 @@ fn info(out: &mut String, cap: &CapFolder, alert: &Alert, level: Level, kind: Me
     } else {
         level.recommended()
     };
-    element(out, 2, "instruction", instruction);
+    element(out, 2, "instruction", &alert.status.marked(instruction));
     parameters(out, alert, level, rule, corrects);
     *out += "    <area>\n";
     element(out, 3, "areaDesc", &cap.area);
@@ -385,7 +385,8 @@ fn headline(alert: &Alert, level: Level) -> String {
         MessageState::Resolved => " ends",
         MessageState::Correction => " is in force; what was called before is corrected",
     };
-    format!("{}, {place}: {level}{what}", alert.site)
+    let headline = format!("{}, {place}: {level}{what}", alert.site);
+    alert.status.marked(&headline)
 }
 
 fn parameters(out: &mut String, alert: &Alert, level: Level, rule: &str, corrects: Option<String>) {

@@ -1,12 +1,13 @@
 //! Runs one hook once: cleaned environment, alert on stdin, own process group, killed at its timeout.
 
 mod processes;
+mod status;
 
 use super::many::{EarlierLevel, ManyAlerts};
 use super::sandbox::{self, CANNOT_RUN, CANNOT_RUN_BECAUSE};
 use crate::alert::Level;
 use crate::config::HookConfig;
-use crate::monitor::{AlertState, CLOCK_FAULT, Event, EventKind};
+use crate::monitor::{CLOCK_FAULT, Event, EventKind};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::AlertIdentity;
 use processes::{ProcessGroup, RUN, kill_all_of, run_name};
@@ -19,6 +20,10 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
 use tokio::process::Child;
 use tokio::task::JoinHandle;
+
+use status::CORRECTION;
+pub(crate) use status::state_name;
+pub use status::{MessageState, Status};
 
 /// What of our own environment a hook sees.
 const KEPT_VARIABLES: [&str; 4] = ["PATH", "HOME", "LANG", "TZ"];
@@ -33,51 +38,6 @@ const KILL_GRACE: Duration = Duration::from_secs(5);
 
 /// The rule of an alert that reports many benchmarks at once.
 pub(super) const FLOOD: &str = "flood";
-/// The state of a message that corrects what was called, and what stands in its key for a level.
-const CORRECTION: &str = "correction";
-
-/// Whether a message means what it says; CAP 1.2's words.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
-pub enum Status {
-    /// The daemon's own.
-    Actual,
-    /// From a replay.
-    Exercise,
-    /// From `hook test`.
-    Test,
-}
-
-impl Status {
-    /// The word in `SLIPWATCH_STATUS`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Actual => "Actual",
-            Self::Exercise => "Exercise",
-            Self::Test => "Test",
-        }
-    }
-}
-
-/// What a message says of a level.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum MessageState {
-    /// It is in force.
-    Firing,
-    /// It has ended.
-    Resolved,
-    /// With readings that came late, or were corrected, it would have been called in the past; what is in force stays so.
-    Correction,
-}
-
-impl From<AlertState> for MessageState {
-    fn from(state: AlertState) -> Self {
-        match state {
-            AlertState::Firing => Self::Firing,
-            AlertState::Resolved => Self::Resolved,
-        }
-    }
-}
 
 /// An alert, or the correction of one, on its way to people.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -121,7 +81,7 @@ pub struct HookBody<'a> {
     /// Whether it means what it says.
     status: Status,
     /// What people are asked to do; null at the end of an alert.
-    recommended: Option<&'static str>,
+    recommended: Option<String>,
     /// By which this alert, and no other, is acknowledged once; null where the site has no public address.
     acknowledge_url: Option<&'a str>,
     /// Which attempt this is, from 1.
@@ -241,7 +201,13 @@ impl Alert {
         matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == CLOCK_FAULT)
     }
 
-    fn variables(&self, attempt: u32, link: Option<&str>) -> [(&'static str, String); 14] {
+    /// What people are recommended to do; of what is over, nothing.
+    fn recommended(&self) -> Option<String> {
+        let is_firing = self.state == MessageState::Firing;
+        is_firing.then(|| self.status.recommended(self.level))
+    }
+
+    fn variables(&self, attempt: u32, link: Option<&str>) -> [(&'static str, String); 15] {
         let benchmark = self.event.benchmark.as_ref();
         let count = self.many.as_ref().map_or(1, |many| many.members.len());
         let optional_time = self.failure_time.map(|time| time.to_string());
@@ -270,6 +236,10 @@ impl Alert {
             ("SLIPWATCH_ATTEMPT", attempt.to_string()),
             ("SLIPWATCH_STATUS", self.status.name().to_owned()),
             (
+                "SLIPWATCH_RECOMMENDED",
+                self.recommended().unwrap_or_default(),
+            ),
+            (
                 "SLIPWATCH_ACKNOWLEDGE_URL",
                 link.unwrap_or_default().to_owned(),
             ),
@@ -293,22 +263,13 @@ impl Alert {
             site: &self.site,
             failure_time: self.failure_time,
             status: self.status,
-            recommended: (self.state == MessageState::Firing).then(|| self.level.recommended()),
+            recommended: self.recommended(),
             acknowledge_url: link,
             attempt,
             schema_version: 1,
         })?;
         body.push(b'\n');
         Ok(body)
-    }
-}
-
-/// The word in `SLIPWATCH_STATE`.
-pub(crate) fn state_name(state: MessageState) -> &'static str {
-    match state {
-        MessageState::Firing => "firing",
-        MessageState::Resolved => "resolved",
-        MessageState::Correction => CORRECTION,
     }
 }
 

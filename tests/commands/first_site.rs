@@ -727,7 +727,7 @@ fn what_hardly_means_what_was_intended_is_said_as_a_suspicion_with_its_evidence(
     let metres = table(&|time, value| format!("{time}+02:00,{:.3}\n", 12.345 + value / 1000.0));
     let ahead = plain(60).replace("2017-", "2417-");
     let cases = [
-        (marked, "-999 stands 1 times, first at 2017-06-01T18:00:00Z"),
+        (marked, "-999 stands 1 time, first at 2017-06-01T18:00:00Z"),
         (fallen, "it fell by 401.824 mm, 195 times the usual scatter"),
         (metres, "unit = \"m\""),
         (ahead, "ahead of this machine's clock: is the time_zone"),

@@ -162,7 +162,8 @@ fn levels_and_forecasts_are_those_of_a_replay_with_the_same_flags() {
             levels.push(event["level"].as_str().unwrap().to_owned());
         }
     }
-    let chance = format!("chance {:.2}", chance.unwrap());
+    let chance = slipwatch::alert::chance_in_words(chance.unwrap());
+    let chance = format!("chance {}", chance.replace('>', "&gt;"));
     assert!(svg.contains(&chance), "{chance}");
     for level in ["green", "yellow", "orange", "red"] {
         let is_drawn = svg.contains(&format!(">{level}<"));

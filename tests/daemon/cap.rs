@@ -203,10 +203,15 @@ async fn a_message_has_what_the_schema_asks_for_and_any_text_in_it() {
         ordered(info, &OF_INFO);
         assert_eq!(child(info, "severity"), "Extreme");
         assert_eq!(child(info, "responseType"), "Evacuate");
-        assert_eq!(
-            child(info, "headline"),
-            "Monte \"Toc\" <&>, benchmark <5>: red"
-        );
+        let mark = match word {
+            "Exercise" => "EXERCISE, do not act on this: ",
+            "Test" => "TEST, do not act on this: ",
+            _ => "",
+        };
+        let headline = format!("{mark}Monte \"Toc\" <&>, benchmark <5>: red");
+        assert_eq!(child(info, "headline"), headline);
+        let instruction = format!("{mark}Evacuate the area");
+        assert!(child(info, "instruction").starts_with(&instruction));
         assert_eq!(
             child(info, "description"),
             "velocity > 5 & rising \u{fffd}\u{fffd}\u{fffd} caf\u{e9}"

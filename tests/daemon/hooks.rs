@@ -568,7 +568,7 @@ fn the_sample_hook_says_it_in_one_line_for_a_person() {
         .unwrap();
     assert_eq!(
         String::from_utf8(output.stdout).unwrap(),
-        "[Test] Monte Toc: red firing at benchmark 5, 2017-06-06T17:00:00Z\n"
+        "[Test] Monte Toc: red called at benchmark 5, 2017-06-06T17:00:00Z\n"
     );
 }
 

@@ -17,7 +17,8 @@ const RED: Said<'_> = ("red", "firing", "Actual");
 
 /// Runs one with the environment and the input that the daemon gives it.
 fn run(name: &str, arguments: &[&str], said: Said<'_>, more: &[(&str, &Path)]) -> Output {
-    let input = r#"{"event": "alert", "text": "benchmark 5: red"}"#;
+    let input =
+        r#"{"event": "alert", "text": "benchmark 5: red; chance of collapse 57 % within 48 h"}"#;
     run_with(name, arguments, said, (more, input))
 }
 
@@ -45,6 +46,11 @@ fn run_with(
         .env("SLIPWATCH_FAILURE_TIME", "2017-06-07T03:00:00Z")
         .env("SLIPWATCH_ATTEMPT", "1")
         .env("SLIPWATCH_STATUS", status)
+        .env(
+            "SLIPWATCH_TEXT",
+            "benchmark 5: red; chance of collapse 57 % within 48 h",
+        )
+        .env("SLIPWATCH_RECOMMENDED", "Evacuate the area.")
         .envs(more.iter().copied())
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -84,17 +90,20 @@ fn an_email_goes_to_each_address_with_the_alert_in_it_and_no_name_forges_a_heade
     assert_eq!(headers[0], "To: duty@example.org, office@example.org");
     assert_eq!(
         headers[1],
-        "Subject: [Actual] Monte Toc: red firing at 5Bcc: all@example.org"
+        "Subject: [Actual] Monte Toc: red called at 5Bcc: all@example.org"
     );
     assert!(
         !headers.iter().any(|line| line.starts_with("Bcc")),
         "{head}"
     );
-    assert!(
-        body.contains("median forecast of the collapse: 2017-06-07T03:00:00Z"),
-        "{body}"
-    );
-    assert!(body.contains(r#""text": "benchmark 5: red""#), "{body}");
+    for part in [
+        "Collapse forecast (median): 2017-06-07T03:00:00Z",
+        "\nbenchmark 5: red; chance of collapse 57 % within 48 h.\n",
+        "\nWhat to do: Evacuate the area.\n",
+        r#""text": "benchmark 5: red; chance"#,
+    ] {
+        assert!(body.contains(part), "{part}: {body}");
+    }
     let failing = program(folder.path(), "#!/bin/sh\ncat > /dev/null\nexit 75\n");
     let output = run("email.sh", &to, RED, &[("SENDMAIL", &failing)]);
     assert_eq!(output.status.code(), Some(75), "the daemon tries again");
@@ -128,7 +137,7 @@ fn an_email_has_no_line_that_a_mailer_refuses_and_only_ascii_in_its_head() {
     let (head, body) = mail.split_once("\n\n").unwrap();
     assert!(head.is_ascii(), "{head}");
     assert!(head.contains("Subject: =?UTF-8?B?"), "{head}");
-    assert!(body.contains("La Clapi\u{e8}re: red (firing)"), "{body}");
+    assert!(body.contains("La Clapi\u{e8}re: red called at"), "{body}");
     assert!(body.contains("\"field7\":\"value\",\n\"field8\""), "{body}");
 }
 
@@ -139,7 +148,7 @@ fn answering(status: &'static str) -> (String, thread::JoinHandle<String>) {
     let got = thread::spawn(move || {
         let (mut stream, _) = listener.accept().unwrap();
         let (mut got, mut part) = (String::new(), [0; 4096]);
-        while !got.ends_with("03:00:00Z") {
+        while !got.ends_with("Evacuate the area.") {
             let count = stream.read(&mut part).unwrap();
             assert!(count > 0, "{got}");
             got += std::str::from_utf8(&part[..count]).unwrap();
@@ -163,11 +172,16 @@ fn a_push_message_has_the_priority_of_the_level_and_a_server_that_refuses_it_is_
         assert!(output.status.success(), "{output:?}");
         let got = got.join().unwrap();
         assert!(got.starts_with("POST /monte-toc HTTP/1.1\r\n"), "{got}");
-        let title = format!("Title: [{}] Monte Toc: {} {}\r\n", said.2, said.0, said.1);
+        let state = if said.1 == "firing" {
+            "called"
+        } else {
+            "ended"
+        };
+        let title = format!("Title: [{}] Monte Toc: {} {state}\r\n", said.2, said.0);
         for part in [
             title.as_str(),
             priority,
-            "\r\n\r\n5Bcc: all@example.org, 2017-06-06T17:00:00Z; median",
+            "\r\n\r\n5Bcc: all@example.org, 2017-06-06T17:00:00Z; collapse forecast (median) 2017",
         ] {
             assert!(got.contains(part), "{part}: {got}");
         }
@@ -265,7 +279,8 @@ fn a_text_message_goes_to_each_number_and_a_modem_that_refuses_is_a_failure() {
     let output = run("sms.py", &[device, "+391", "+392"], RED, &[]);
     assert!(output.status.success(), "{output:?}");
     drop(held);
-    let text = "[Actual] Monte Toc: RED firing at 5 Bcc: all@example.org, 2017-06-06T17:00:00Z benchmark 5: red";
+    let text = "RED: Monte Toc, 5 Bcc: all@example.org. EVACUATE by the plan. Collapse forecast 2017-06-07 03:00 UTC. \
+                At 2017-06-06 17:00 UTC: chance of collapse 57 %";
     assert_eq!(
         got.join().unwrap(),
         [

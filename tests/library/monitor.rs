@@ -393,10 +393,11 @@ fn a_rule_of_the_site_fires_when_its_conditions_have_held_for_as_long_as_it_asks
         "{since_change:?}"
     );
     for part in [
-        "red (rule:fast); velocity of 50 mm/day or more (",
+        "red; velocity of 50 mm/day or more (",
         " mm/day) and displacement since the first reading of 100 mm or more (1",
         " mm) and chance of collapse of 0.000000001 or more within 12h and until the next reading (",
-        ", for 3h; chance ",
+        ", for 3h; chance of collapse ",
+        "; rule rule:fast",
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }

@@ -1,6 +1,6 @@
 //! One alert in plain words.
 
-use crate::alert::{hours_in_words, percent_in_words};
+use crate::alert::{percent_in_words, span_in_words};
 use crate::cli::text;
 use crate::monitor::{Event, EventKind, FailureTime};
 use crate::reading::{Timestamp, counted, figure};
@@ -45,7 +45,7 @@ pub(super) fn shown(alert: &AlertView, zone: &TimeZone) -> String {
         "evacuation",
         &format!(
             "takes {}, by the settings then",
-            hours_in_words(policy.evacuation_time)
+            span_in_words(policy.evacuation_time)
         ),
     );
     out += &deliveries(&alert.deliveries);

@@ -1,7 +1,7 @@
 //! A crisis as it unfolds: a line for each change of a level, with its reason; then velocity, level and forecast as marks.
 
 use super::marks::{self, MarkScale};
-use crate::alert::{Level, Policy, hours_in_words, percent_in_words};
+use crate::alert::{Level, Policy, percent_in_words, span_in_words};
 use crate::cli::text::plain;
 use crate::monitor::{AlertState, Event, EventKind, FailureTime, LevelChance};
 use crate::reading::{BenchmarkId, TimeSpan, Timestamp, days_since, figure};
@@ -273,7 +273,7 @@ fn reason(rule: &str, moment: Option<&DemoMoment>) -> String {
         "chance-within-evacuation-time" => {
             let (chance, span) = moment.red.map_or_else(
                 || (moment.within_evacuation, "time".to_owned()),
-                |red| (red.chance, hours_in_words(red.within())),
+                |red| (red.chance, span_in_words(red.within())),
             );
             format!("{} in {span}{median}", percent_in_words(chance))
         }

@@ -65,6 +65,17 @@ pub(super) fn config(plan: &InitPlan) -> String {
     text
 }
 
+/// What the name of a zone without summer time means: its sign is the other way round.
+fn as_an_offset(zone: &str) -> String {
+    let turned = |(sign, hours): (char, &str)| {
+        format!(": UTC{sign}{hours}, which this name writes with the other sign")
+    };
+    let rest = zone.strip_prefix("Etc/GMT").unwrap_or_default();
+    let hours = rest.strip_prefix('-').map(|hours| ('+', hours));
+    let hours = hours.or_else(|| rest.strip_prefix('+').map(|hours| ('-', hours)));
+    hours.map_or_else(String::new, turned)
+}
+
 /// What follows the file of one day.
 fn dated_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPlan) {
     if let Some(pattern) = dated::of_one_day(&source.path, &plan.benchmarks) {
@@ -96,8 +107,9 @@ fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPla
     if let Some(zone) = zone.filter(|_| source.kind != SourceKind::Mcap) {
         let _ = writeln!(
             text,
-            "time_zone = {}          # of times that state no offset",
-            quoted(zone)
+            "time_zone = {}          # of times that state no offset{}",
+            quoted(zone),
+            as_an_offset(zone)
         );
     }
     if let Some(dst) = &plan.dst {

@@ -18,6 +18,13 @@ pub(super) fn without_readings(
     {
         return format!("{fault}; no row of the file can be used");
     }
+    if looked.columns.iter().any(is_named) {
+        return format!(
+            "{}: its columns of readings hold no number so far; run init again once they do, or give a former file of it and then write this \
+             one's path into the config",
+            file.display()
+        );
+    }
     let numbers = looked.columns.iter().filter_map(|(name, meaning)| {
         matches!(meaning, Meaning::Covariate { .. }).then_some(name.as_str())
     });
@@ -35,7 +42,8 @@ pub(super) fn without_readings(
                 file.display()
             ),
             columns => format!(
-                "{}: {named}, and none of its columns ({}) holds numbers; give a file that has some",
+                "{}: {named}, and none of its columns ({}) holds numbers; give a file that has some; where a title stands \
+                 above its header, the flag skip-lines says how many lines that has",
                 file.display(),
                 columns.join(", ")
             ),

@@ -26,12 +26,18 @@ pub(super) fn summary(material: &Material, series: &Series) -> String {
     let level = levels.last().map_or(Level::Green, |stretch| stretch.level);
     let since = levels.last().map_or(first, |stretch| stretch.from);
     let unknown = unknown.last().filter(|stretch| stretch.is_in_force);
-    let unknown = unknown.map_or_else(String::new, |stretch| {
-        format!(" and unknown since {}", time(Some(stretch.from)))
-    });
+    let standing = match (level, &unknown) {
+        // What nothing can be said of is never called green.
+        (Level::Green, Some(stretch)) => format!("unknown since {}", time(Some(stretch.from))),
+        (level, Some(stretch)) => format!(
+            "{level} since {} and unknown since {}",
+            time(Some(since)),
+            time(Some(stretch.from))
+        ),
+        (level, None) => format!("{level} since {}", time(Some(since))),
+    };
     let mut out = format!(
-        "{level} since {}{unknown}; {} readings, {} to {}",
-        time(Some(since)),
+        "{standing}; {} readings, {} to {}",
         series.readings.len(),
         time(Some(first)),
         time(Some(last)),

@@ -221,7 +221,7 @@ impl Replayed<'_> {
         ];
         let described = bounds.map(|(name, time)| match time {
             Some(time) => format!("{name} {}", self.short(time)),
-            None => format!("{name} never"),
+            None => format!("{name} later"),
         });
         format!("{}; {chance}", described.join(", "))
     }

@@ -323,7 +323,7 @@ mod tests {
         for text in [
             "no forecast yet",
             ">chance 0.50<",
-            "5 % 02-10, median never, 95 % never; chance 0.50",
+            "5 % 02-10, median later, 95 % later; chance 0.50",
             "5 % 02-10, median 02-19, 95 % 03-02; chance 0.50",
             "Benchmark &lt;a&gt;",
             "green",

@@ -204,7 +204,7 @@ fn described(alert: &AlertView, zone: &TimeZone) -> String {
         alert.level,
         escaped(&place),
         local(alert.since, zone),
-        escaped(&alert.text),
+        escaped(&in_zone(&alert.text, zone)),
         escaped(alert.recommended),
     );
     if let Some((at, by)) = alert.acknowledged() {
@@ -213,6 +213,19 @@ fn described(alert: &AlertView, zone: &TimeZone) -> String {
         let _ = writeln!(text, "<p>Acknowledged{at}{by}.</p>");
     }
     text
+}
+
+/// A text with its times in the site's zone.
+fn in_zone(text: &str, zone: &TimeZone) -> String {
+    let words = text.split_inclusive([' ', ',', ';']).map(|word| {
+        let bare = word.trim_end_matches([' ', ',', ';']);
+        let time = bare.ends_with('Z').then(|| bare.parse().ok()).flatten();
+        time.map_or_else(
+            || word.to_owned(),
+            |time| local(time, zone) + &word[bare.len()..],
+        )
+    });
+    words.collect()
 }
 
 fn local(time: Timestamp, zone: &TimeZone) -> String {

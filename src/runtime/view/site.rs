@@ -31,6 +31,8 @@ pub struct Standing {
     pub is_unknown: bool,
     /// Since when not.
     pub unknown_since: Option<Timestamp>,
+    /// What people are asked to do: at the level in force, or because nothing can be said.
+    pub recommended: &'static str,
     /// When its newest reading was measured.
     pub newest_reading: Option<Timestamp>,
     /// How long before the moment that was.
@@ -192,10 +194,18 @@ impl SiteReader {
             own.partition(|((_, level), _)| *level == Level::Unknown);
         let highest = called.into_iter().max_by_key(|((_, level), _)| *level);
         let unknown_since = unknown.first().map(|(_, event)| event.time);
+        let level = highest.map_or(Level::Green, |((_, level), _)| *level);
+        let is_unknown = newest.is_none() || unknown_since.is_some();
+        let asks = if is_unknown && level == Level::Green {
+            Level::Unknown
+        } else {
+            level
+        };
         let mut standing = Standing {
-            level: highest.map_or(Level::Green, |((_, level), _)| *level),
+            level,
             since: highest.map(|(_, event)| event.in_force_since()),
-            is_unknown: newest.is_none() || unknown_since.is_some(),
+            is_unknown,
+            recommended: asks.recommended(),
             unknown_since,
             newest_reading: newest,
             silent_seconds: silent_seconds(newest, moment),

@@ -3,7 +3,7 @@
 import { get } from '/page/ask.js';
 import { AFTER, Charts } from '/page/charts.js';
 import { buttons } from '/page/site.js';
-import { badges, collapse, el, expectedChance, figure, left, list, outlookChance, percent, place, redChance, span, svg, described, when } from '/page/words.js';
+import { badges, collapse, el, expectedChance, figure, isOutdated, left, levelWords, list, outlookChance, percent, place, reason, redChance, span, svg, described, when } from '/page/words.js';
 
 const DAY = 86400;
 const SPANS = [[null, 'Whole record'], [365 * DAY, '1 year'], [30 * DAY, '30 days'], [7 * DAY, '7 days'], [DAY, '1 day']];
@@ -134,16 +134,21 @@ function fillList(node, fresh) {
 function facts(view) {
   const { standing } = view;
   const reading = standing.newest_reading ? [when(standing.newest_reading), el('small', {}, `${span(standing.silent_seconds)} ago`)] : ['none yet'];
+  const since = [[standing.since, 'since '], [standing.unknown_since, 'unknown since ']].filter(([time]) => time);
+  const why = reason(standing, view.alerts);
+  const asOf = isOutdated(standing) ? el('small', {}, 'nothing can be said now') : null;
   const rows = [
-    ['Level', standing.since ? [standing.level, el('small', {}, 'since ', when(standing.since))] : [standing.level]],
+    ['Level', [levelWords(standing), ...since.map(([time, word]) => el('small', {}, word, when(time)))]],
     ['Newest reading', reading],
     ['Velocity', [`${figure(standing.velocity_mm_per_day)} mm/day`]],
-    ['Collapse forecast', [...collapse(standing.failure_time), left(standing.failure_time, view.at ?? view.now) ? el('small', {}, left(standing.failure_time, view.at ?? view.now)) : null]],
-    ['Chance of collapse', [redChance(standing)[0], el('small', {}, redChance(standing)[1]), el('small', {}, outlookChance(standing)), expectedChance(standing) && el('small', {}, expectedChance(standing))]],
+    ['Collapse forecast', asOf ? ['-', asOf]
+      : [...collapse(standing.failure_time), left(standing.failure_time, view.at ?? view.now) ? el('small', {}, left(standing.failure_time, view.at ?? view.now)) : null]],
+    ['Chance of collapse', asOf ? ['-']
+      : [redChance(standing)[0], el('small', {}, redChance(standing)[1]), el('small', {}, outlookChance(standing)), expectedChance(standing) && el('small', {}, expectedChance(standing))]],
     ['Alarm state', [standing.alarm_state]],
     ['Regime', [standing.regime ?? '-', view.latest ? el('small', {}, `unstable ${percent(view.latest.regime.probability_unstable)}, accelerating ${percent(view.latest.regime.probability_accelerating)}`) : null]],
   ];
-  const nodes = [el('dl', {}, rows.map(([name, value]) => el('div', {}, el('dt', {}, name), el('dd', {}, value.filter((part) => part !== null)))))];
+  const nodes = [el('p', {}, el('strong', {}, standing.recommended), why && el('span', { class: 'soft' }, ' ', ...why)), el('dl', {}, rows.map(([name, value]) => el('div', {}, el('dt', {}, name), el('dd', {}, value.filter((part) => part !== null)))))];
   if (view.is_cut) nodes.push(el('p', { class: 'soft' }, 'Only the newest 200,000 readings are looked at.'));
   return nodes;
 }

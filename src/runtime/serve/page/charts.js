@@ -8,6 +8,8 @@ const LEVELS = ['green', 'yellow', 'orange', 'red', 'unknown'];
 const AHEAD = 0.3;
 /** What lies after the moment, as a share of what lies before it, in a stretch that was chosen. */
 export const AFTER = 0.25;
+/** What the words of the time axis take below each chart. */
+const TIMES = 10;
 const AXIS = 64;
 
 const seconds = (time) => Date.parse(time) / 1000;
@@ -153,7 +155,7 @@ export class Charts {
     const axis = { stroke: shades.soft, grid: { stroke: shades.rule, width: 1 }, ticks: { stroke: shades.rule, width: 1 }, font: '12px system-ui, sans-serif' };
     return {
       width: Math.max(this.node.clientWidth, 200),
-      height: chart.height,
+      height: chart.height + TIMES,
       tzDate: axisDate,
       legend: { show: false },
       padding: [6, 24, 0, 0],
@@ -163,7 +165,7 @@ export class Charts {
       },
       scales: { x: { time: true, range: () => this.range() }, y: { range: (plot, min, max) => entry.chart.range(min, max, this) } },
       axes: [
-        { ...axis, size: chart.isLast ? 40 : 20, space: 90, values: (plot, ticks, index, space, step) => ticks.map((tick) => (chart.isLast ? tickWord(tick, step) : '')) },
+        { ...axis, size: 30, space: 90, values: (plot, ticks, index, space, step) => ticks.map((tick) => tickWord(tick, step)) },
         { ...axis, size: AXIS, show: true, splits: chart.splits, values: chart.values, grid: chart.hasGrid === false ? { show: false } : axis.grid },
       ],
       series: [{}, ...chart.series(shades)],
@@ -283,8 +285,6 @@ function charts(view) {
     list.push(plain(`covariate ${one.name}`, `${one.name}${one.unit ? `, ${one.unit}` : ''}`, one, 'third', 110));
   }
   list.push(levels(view));
-  list[list.length - 1].isLast = true;
-  list[list.length - 1].height += 20;
   return list;
 }
 
@@ -379,7 +379,7 @@ function forecasts(view) {
     keys: (shades) => [['median', shades.accent], ['5 to 95 %', shades.accent, '', shades.fill], ['no time left', shades.soft, 'dotted'], ...(view.collapse ? [['what happened', shades.ink]] : [])],
     value: (index) => {
       const { failure_time: failure } = view.forecasts[index];
-      const word = (time) => (time ? minute(time) : 'never');
+      const word = (time) => (time ? minute(time) : 'later');
       return `made ${minute(view.forecasts[index].time)}: ${word(failure.median)} (${word(failure.low)} to ${word(failure.high)}), chance ${percent(failure.probability)}`;
     },
     over: (plot, { shades }) => clipped(plot, (ctx) => {

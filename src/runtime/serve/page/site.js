@@ -1,7 +1,7 @@
 // The site: every benchmark by level, where each stands, what is in force.
 
 import { get } from '/page/ask.js';
-import { badge, badges, collapse, el, figure, left, list, local, outlookChance, place, redChance, shape, span, svg, described, when } from '/page/words.js';
+import { badge, badges, collapse, el, figure, isOutdated, left, list, local, outlookChance, place, redChance, shape, span, svg, described, when } from '/page/words.js';
 
 const RANK = { green: 0, unknown: 0.5, yellow: 1, orange: 2, red: 3 };
 const HEALTH = [
@@ -52,7 +52,7 @@ export class SitePage {
     counts.push([unknown, 'unknown']);
     const text = counts.filter(([n]) => n > 0).map(([n, level]) => `${n} ${level}`).join(', ');
     return el('div', { class: 'head' }, el('h1', {}, site.site), badge(site.level, 'big'),
-      site.unknown_since ? [badge('unknown', 'big'), el('span', {}, 'since ', when(site.unknown_since))] : null,
+      site.unknown_since ? [badge('unknown', 'big'), el('span', {}, 'unknown since ', when(site.unknown_since))] : null,
       el('span', { class: 'soft' }, `${site.benchmarks.length} benchmark${site.benchmarks.length === 1 ? '' : 's'}: ${text || 'none yet'}`));
   }
 
@@ -61,7 +61,10 @@ export class SitePage {
     const alerts = site.alerts.filter((alert) => alert.benchmark).sort((a, b) => RANK[b.level] - RANK[a.level]);
     const items = alerts.map((alert) => {
       const seen = site.acknowledged_by[alert.key];
-      return el('li', {}, badge(alert.level), ' ', el('a', { href: place(alert.benchmark) }, alert.benchmark), ' since ', when(alert.time),
+      const standing = site.benchmarks.find((one) => one.benchmark === alert.benchmark);
+      const own = standing && standing.level === alert.level ? standing : null;
+      return el('li', {}, badge(alert.level), ' ', el('a', { href: place(alert.benchmark) }, alert.benchmark), ' since ', when(own?.since ?? alert.time),
+        own ? el('div', {}, el('strong', {}, own.recommended)) : null,
         el('div', {}, ...local(alert.text)),
         seen ? el('div', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'} at `, when(seen.time)) : null);
     });
@@ -102,16 +105,17 @@ function rank(standing) {
 
 function table(standings, site) {
   if (standings.length === 0) return el('p', {}, 'No benchmark has given a reading yet.');
-  const names = ['Level', 'Benchmark', 'Newest reading', 'Velocity', 'Collapse forecast', 'Chance in time', 'Regime'];
+  const names = ['Level', 'Benchmark', 'Newest reading', 'Velocity', 'Collapse forecast', 'Chance of collapse', 'Regime'];
   const row = (one) => {
     const cells = [
       [badges(one), one.since ? el('small', {}, 'since ', when(one.since)) : null],
       [el('a', { class: 'id', href: place(one.benchmark) }, one.benchmark)],
       one.newest_reading ? [when(one.newest_reading), el('small', {}, `${span(one.silent_seconds)} ago`)] : ['none yet'],
       [`${figure(one.velocity_mm_per_day)} mm/day`],
-      [...collapse(one.failure_time), one.failure_time ? el('small', {}, left(one.failure_time, site.at ?? site.now)) : null],
-      [redChance(one)[0], el('small', {}, redChance(one)[1]), el('small', {}, outlookChance(one))],
-      [one.regime ?? '-'],
+      ...(isOutdated(one) ? [['-', el('small', {}, 'nothing can be said now')], ['-'], ['-']] : [
+        [...collapse(one.failure_time), one.failure_time ? el('small', {}, left(one.failure_time, site.at ?? site.now)) : null],
+        [redChance(one)[0], el('small', {}, redChance(one)[1]), el('small', {}, outlookChance(one))],
+        [one.regime ?? '-']]),
     ];
     return el('tr', { 'data-benchmark': one.benchmark, 'data-level': one.level }, cells.map((cell, index) => el('td', { 'data-name': names[index] }, cell)));
   };

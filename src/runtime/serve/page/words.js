@@ -117,10 +117,10 @@ export function outlookChance(one) {
   return `${percent(orange.chance)} within ${span(3600 * orange.within_hours)}, orange from ${percent(orange.at_least)}, yellow from ${percent(yellow.at_least)}`;
 }
 
-/** How likely it is that a collapse comes at all, whatever calls a level; null in older states. */
+/** The chance that is reported, without what levels take off it; null in older states. */
 export function expectedChance(one) {
   const chances = one.chances_of_collapse;
-  return chances ? `that one comes: ${percent(chances.within_2_days)} in 2 days, ${percent(chances.within_30_days)} in 30 days` : null;
+  return chances ? `best estimate: ${percent(chances.within_2_days)} within 2 days, ${percent(chances.within_30_days)} within 30 days` : null;
 }
 
 /** 5 %, < 1 %: no chance is shown as none, or as certain. */
@@ -151,17 +151,29 @@ export function badge(level, size = '') {
 
 /** A benchmark's level, and beside it whether nothing can be said. */
 export function badges(standing, size = '') {
-  const own = standing.is_unknown && standing.level === 'green' && !standing.since ? [] : [badge(standing.level, size)];
+  const own = isOutdated(standing) ? [] : [badge(standing.level, size)];
   return standing.is_unknown ? [...own, ' ', badge('unknown', size)] : own;
+}
+
+/** The level in words: a benchmark of which nothing can be said is never green. */
+export function levelWords(standing) {
+  if (!standing.is_unknown) return standing.level;
+  return isOutdated(standing) ? 'unknown' : `${standing.level}, unknown`;
+}
+
+/** Whether the forecast is not of now: nothing can be said, and no level is in force. */
+export function isOutdated(standing) {
+  return standing.is_unknown && standing.level === 'green' && !standing.since;
 }
 
 /** When the slope is forecast to collapse, with the interval. */
 export function collapse(forecast) {
   if (!forecast) return ['-', el('small', {}, 'no forecast yet')];
-  const bound = (time) => (time ? minute(time) : 'never');
-  const main = forecast.median ? [when(forecast.median)] : ['none in sight'];
-  const chance = `chance ${percent(forecast.probability)} in ${Math.round(forecast.horizon_days)} days`;
-  const text = forecast.low ? `90 %: ${bound(forecast.low)} to ${bound(forecast.high)}; ${chance}` : chance;
+  const days = Math.round(forecast.horizon_days);
+  const main = forecast.median ? [when(forecast.median)] : [`not within ${days} days`];
+  const chance = `chance ${percent(forecast.probability)} within ${days} days`;
+  const until = forecast.high ? `to ${minute(forecast.high)}` : 'or later';
+  const text = forecast.low ? `90 %: ${minute(forecast.low)} ${until}; ${chance}` : chance;
   return [...main, el('small', {}, text)];
 }
 
@@ -177,7 +189,7 @@ export function described(event) {
   switch (event.event) {
     case 'alert': return event.state === 'firing' ? event.text : `${event.level} ${event.state}: ${event.text}`;
     case 'together': return event.groups.map((group) => `${group.benchmarks.join(', ')} share a failure time: ${
-      group.failure_time.median ? minute(group.failure_time.median) : 'none in sight'}, chance ${
+      group.failure_time.median ? minute(group.failure_time.median) : `not within ${Math.round(group.failure_time.horizon_days)} days`}, chance of collapse ${
       percent(group.chance_within_evacuation_time)} within the evacuation time`).join('; ') || 'no benchmarks share a failure time any more';
     case 'order': return `${event.order}${event.by ? ` by ${event.by}` : ''}${event.until ? ` until ${minute(event.until)}` : ''}${event.why ? `: ${event.why}` : ''}`;
     case 'regime-flip': return `regime ${event.from} to ${event.to}, probability ${percent(event.probability)}`;
@@ -192,11 +204,17 @@ export function described(event) {
   }
 }
 
+/** Why the level is in force: the words of its alert; null where there is none. */
+export function reason(standing, alerts) {
+  const called = alerts.find((one) => one.benchmark === standing.benchmark && one.level === standing.level && one.state === 'firing');
+  return called ? local(called.text) : null;
+}
+
 /** A list of events. */
 export function list(events, none, own = null) {
   if (events.length === 0) return el('p', { class: 'soft' }, none);
   return el('ul', { class: 'log', tabindex: '0' }, events.map((event) => el('li', {},
-    when(event.time),
+    when(event.time), ' ',
     event.benchmark === own && own !== null ? null : event.benchmark ? el('a', { href: place(event.benchmark) }, event.benchmark) : el('span', {}, 'site'),
     ' ', event.event === 'alert' && event.state === 'firing' ? badge(event.level) : null, ' ', ...local(described(event)))));
 }
