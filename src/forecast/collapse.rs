@@ -198,15 +198,15 @@ impl Indicators {
         let (mut reached, mut sure) = (0.0_f64, 0.0_f64);
         let (mut all, mut counted) = (Vec::new(), Vec::new());
         let accelerating = self.accelerating();
-        for AskedSpan { power, days, share } in spans(&self.scales) {
+        for span in spans(&self.scales) {
+            let AskedSpan { power, days, share } = span;
             let creeps = (1.0 - accelerating) * (1.0 - may_grow(&self.scales, power, days));
             let chance = network.chance(&self.inputs(members, power, days)) * (1.0 - creeps);
             reached += share * (chance - reached).max(0.0);
             let goes_on = goes_on(&self.scales, power, accelerating);
             sure += share * (self.most(days) * chance * goes_on - sure).max(0.0);
-            let known = days * (share - 1.0).exp2();
-            all.push((known, reached));
-            counted.push((known, sure));
+            all.push((span.counts_within(), reached));
+            counted.push((span.counts_within(), sure));
         }
         for chances in [&mut all, &mut counted] {
             between_far_readings(chances);

@@ -25,6 +25,13 @@ pub(super) struct AskedSpan {
     pub(super) share: f64,
 }
 
+impl AskedSpan {
+    /// Within how many days its chance counts.
+    pub(super) fn counts_within(&self) -> f64 {
+        self.days * (self.share - 1.0).exp2()
+    }
+}
+
 pub(super) fn spans(scales: &Scales) -> impl Iterator<Item = AskedSpan> {
     let count = scales.each.len();
     let base = scales.base_days;
@@ -121,8 +128,7 @@ mod tests {
             values: values.collect(),
         };
         let scales = Scales::of(&observations).unwrap();
-        let last = spans(&scales).last().unwrap();
-        last.days * (last.share - 1.0).exp2()
+        spans(&scales).last().unwrap().counts_within()
     }
 
     #[test]

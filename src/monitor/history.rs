@@ -165,7 +165,9 @@ impl History {
     /// Takes off what the readings jump by at each reset that has readings before and after it by now; the times of
     /// these resets, and their jumps in mm.
     pub(super) fn reset(&mut self, declared: &Declarations) -> Vec<(Timestamp, f64)> {
-        if self.observations.quantity != Quantity::Displacement {
+        // With each reading: where all are taken off, nothing is looked through, however many an instrument that sticks each day has.
+        let is_done = declared.resets().count() == self.resets.len();
+        if is_done || self.observations.quantity != Quantity::Displacement {
             return Vec::new();
         }
         let mut pending: Vec<(Timestamp, Option<f64>)> = declared

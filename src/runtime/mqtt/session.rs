@@ -35,10 +35,7 @@ pub(super) type NoConnection = Box<dyn Error + Send + Sync>;
 
 /// The session, connected or not.
 pub(super) struct Session {
-    broker: Broker,
-    client_id: String,
-    /// Whether the broker keeps what comes for it while there is no connection.
-    is_kept: bool,
+    client: BrokerClient,
     version: Version,
     /// Made with the first connection; over TLS again with each, so that other authorities hold from the next one on.
     link: Option<Link>,
@@ -46,6 +43,14 @@ pub(super) struct Session {
     is_accepted: bool,
     /// Connections that have ended.
     ended: Arc<AtomicU64>,
+}
+
+/// As whom the session is held, and with which broker.
+struct BrokerClient {
+    broker: Broker,
+    id: String,
+    /// Whether the broker keeps what comes for it while there is no connection.
+    is_kept: bool,
 }
 
 /// The versions of the protocol.
@@ -124,22 +129,29 @@ impl BrokerMessage {
 impl Session {
     /// Connects when it is first asked for what came.
     pub(super) fn new(broker: Broker, client_id: String) -> Self {
-        Self {
+        Self::of(BrokerClient {
             broker,
-            client_id,
+            id: client_id,
             is_kept: true,
-            version: Version::Five,
-            link: None,
-            is_accepted: false,
-            ended: Arc::default(),
-        }
+        })
     }
 
     /// One that the broker forgets when the connection ends.
     pub(super) fn passing(broker: Broker, client_id: String) -> Self {
-        Self {
+        Self::of(BrokerClient {
+            broker,
+            id: client_id,
             is_kept: false,
-            ..Self::new(broker, client_id)
+        })
+    }
+
+    fn of(client: BrokerClient) -> Self {
+        Self {
+            client,
+            version: Version::Five,
+            link: None,
+            is_accepted: false,
+            ended: Arc::default(),
         }
     }
 
@@ -155,10 +167,7 @@ impl Session {
     pub(super) async fn next(&mut self) -> Result<SessionEvent, NoConnection> {
         let link = match &mut self.link {
             Some(link) => link,
-            none => {
-                let (broker, id) = (&self.broker, &self.client_id);
-                none.insert(open(self.version, broker, id, self.is_kept).await?)
-            }
+            none => none.insert(open(self.version, &self.client).await?),
         };
         let came = match link {
             Link::Five(client, connection) => match connection.poll().await {
@@ -228,18 +237,14 @@ impl Session {
     }
 }
 
-/// Ready to connect, as a client of this id, whose session the broker keeps or not.
-async fn open(
-    version: Version,
-    broker: &Broker,
-    client_id: &str,
-    is_kept: bool,
-) -> Result<Link, NoConnection> {
-    let transport = transport(&broker.address, broker.ca_file.as_deref())?;
-    let to = (host_of(&broker.address).await?, broker.address.port);
+/// Ready to connect.
+async fn open(version: Version, client: &BrokerClient) -> Result<Link, NoConnection> {
+    let (address, ca_file) = (&client.broker.address, client.broker.ca_file.as_deref());
+    let transport = transport(address, ca_file)?;
+    let to = (host_of(address).await?, address.port);
     Ok(match version {
-        Version::Five => five(broker, to, client_id, is_kept, transport),
-        Version::Three => three(broker, to, client_id, is_kept, transport),
+        Version::Five => five(client, to, transport),
+        Version::Three => three(client, to, transport),
     })
 }
 
@@ -271,46 +276,32 @@ pub(super) fn transport(
     Ok(Transport::tls_with_config(TlsConfiguration::Rustls(config)))
 }
 
-fn five(
-    broker: &Broker,
-    to: (String, u16),
-    client_id: &str,
-    is_kept: bool,
-    transport: Transport,
-) -> Link {
-    let address = &broker.address;
-    let mut options = v5::MqttOptions::new(client_id, to.0, to.1);
+fn five(client: &BrokerClient, to: (String, u16), transport: Transport) -> Link {
+    let mut options = v5::MqttOptions::new(&client.id, to.0, to.1);
     options
-        .set_clean_start(!is_kept)
-        .set_session_expiry_interval(is_kept.then_some(u32::MAX))
+        .set_clean_start(!client.is_kept)
+        .set_session_expiry_interval(client.is_kept.then_some(u32::MAX))
         .set_receive_maximum(Some(MOST_UNACKNOWLEDGED))
         .set_max_packet_size(Some(LONGEST_PACKET))
         .set_manual_acks(true)
         .set_keep_alive(KEEP_ALIVE)
         .set_transport(transport);
-    if let Some((user, password)) = &address.login {
+    if let Some((user, password)) = &client.broker.address.login {
         options.set_credentials(user, password);
     }
     let (client, connection) = v5::AsyncClient::new(options, REQUESTS);
     Link::Five(client, Box::new(connection))
 }
 
-fn three(
-    broker: &Broker,
-    to: (String, u16),
-    client_id: &str,
-    is_kept: bool,
-    transport: Transport,
-) -> Link {
-    let address = &broker.address;
-    let mut options = v3::MqttOptions::new(client_id, to.0, to.1);
+fn three(client: &BrokerClient, to: (String, u16), transport: Transport) -> Link {
+    let mut options = v3::MqttOptions::new(&client.id, to.0, to.1);
     options
-        .set_clean_session(!is_kept)
+        .set_clean_session(!client.is_kept)
         .set_manual_acks(true)
         .set_keep_alive(KEEP_ALIVE)
         .set_max_packet_size(LONGEST_PACKET as usize, LONGEST_SENT)
         .set_transport(transport);
-    if let Some((user, password)) = &address.login {
+    if let Some((user, password)) = &client.broker.address.login {
         options.set_credentials(user, password);
     }
     let (client, connection) = v3::AsyncClient::new(options, REQUESTS);

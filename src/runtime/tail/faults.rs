@@ -38,7 +38,7 @@ impl Follower {
         let files: Vec<(FaultPlace, String)> = files.collect();
         let one_by_one = self.refused_in_turn(&files);
         let faults = folders.chain(self.unended_rows()).chain(one_by_one);
-        faults.chain(files.iter().cloned()).collect()
+        faults.chain(files).collect()
     }
 
     /// The sources whose newest files hold a few rows each, of which none could be used; not those of which `files` names one.
@@ -149,6 +149,16 @@ mod tests {
         Follower::new(&config.sources, &[], saved)
     }
 
+    /// Writes a file of that hour, which was written then.
+    fn upload_at(folder: &Path, hour: u64, text: &str) {
+        let path = folder.join(format!("{hour}.csv"));
+        fs::write(&path, text).unwrap();
+        let ago = Duration::from_secs(36_000 - 3600 * hour);
+        let file = fs::File::options().append(true).open(path).unwrap();
+        let written = std::time::SystemTime::from(clock::now()) - ago;
+        file.set_modified(written).unwrap();
+    }
+
     #[tokio::test(start_paused = true)]
     async fn a_last_row_without_a_line_break_is_a_fault_after_a_minute_until_it_ends() {
         let folder = tempfile::tempdir().unwrap();
@@ -185,12 +195,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let upload = |hour: u64| {
             let row = format!("time,displacement_mm\n2026-01-01T0{hour}:00:00Z,1.0");
-            let file = folder.path().join(format!("{hour}.csv"));
-            fs::write(&file, row).unwrap();
-            let written = std::time::SystemTime::from(clock::now())
-                - Duration::from_secs(36_000 - 3600 * hour);
-            let file = fs::File::options().append(true).open(file).unwrap();
-            file.set_modified(written).unwrap();
+            upload_at(folder.path(), hour, &row);
         };
         let mut follower = follower(folder.path());
         let mut read = async |seconds| {
@@ -271,12 +276,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut follower = follower(folder.path());
         let mut faults = |hour: u64, row: &str| {
-            let file = folder.path().join(format!("{hour}.csv"));
-            fs::write(&file, format!("time,displacement_mm\n{row}\n")).unwrap();
-            let written = std::time::SystemTime::from(clock::now())
-                - Duration::from_secs(36_000 - 3600 * hour);
-            let file = fs::File::options().append(true).open(file).unwrap();
-            file.set_modified(written).unwrap();
+            let text = format!("time,displacement_mm\n{row}\n");
+            upload_at(folder.path(), hour, &text);
             for _ in 0..4 {
                 follower.poll(clock::now());
             }

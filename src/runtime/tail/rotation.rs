@@ -76,6 +76,9 @@ impl Follower {
             }
         }
         left.retain(|_, minutes| minutes.len() >= LEFT_UNENDED);
+        if left.is_empty() {
+            return;
+        }
         for ((source, _), file) in &mut self.files {
             if left.contains_key(source) && file.rests_within_a_line() {
                 file.expect_lines_ended_later();
