@@ -142,10 +142,9 @@ async fn without_the_monitor(broker: &Mosquitto, messages: &[String]) -> f64 {
         let source = follow(
             radio,
             Vec::new(),
-            "floor".to_owned(),
             sender,
             faults,
-            Subscription::default(),
+            Subscription::new("floor".to_owned(), false),
             stopped,
         );
         (deliveries, stop, tokio::spawn(source))

@@ -113,7 +113,7 @@ pub struct DialectArgs {
     /// The column that gives the time; twice where date and time stand in two [default: time or t_days]
     #[arg(long = "time-column", value_name = "NAME")]
     pub time_columns: Vec<String>,
-    /// How times are written: a pattern such as "%d.%m.%Y %H:%M", rfc3339, unix, unix_ms or excel
+    /// How times are written: a pattern such as "%d.%m.%Y %H:%M", rfc3339, unix, unix_ms, excel or mjd
     /// [default: rfc3339]
     #[arg(long, value_name = "FORMAT", value_parser = TimeFormat::parse)]
     pub time_format: Option<TimeFormat>,

@@ -52,16 +52,17 @@ pub(super) struct SiteAlert {
 }
 
 impl SiteAlert {
-    /// Takes the benchmarks' levels; says how the site's changes. Where fewer than the rule asks for are still `judged`, because nothing can be said
-    /// of the others any more, all of those are enough: a site does not stay silent because its sensors have died.
+    /// Takes the benchmarks' levels; says how the site's changes. Where fewer than the rule asks for are still judged, because of `all` nothing can be
+    /// said of `unknown`, all of those are enough: a site does not stay silent because its sensors have died, or have never read.
     fn update(
         &mut self,
         rule: Option<SiteLevel>,
         now: Timestamp,
         in_force: &LevelsInForce,
-        judged: usize,
+        (unknown, all): (usize, usize),
     ) -> Vec<Event> {
-        let needed = |rule: SiteLevel| match in_force.unknown().len() {
+        let judged = all.saturating_sub(unknown);
+        let needed = |rule: SiteLevel| match unknown {
             0 => rule.needed(),
             _ => rule.needed().min(judged.max(1)),
         };
@@ -149,11 +150,11 @@ impl Monitor {
         }
         let (in_force, awaited) = (self.benchmarks.in_force(), self.outages.awaited());
         let all = self.benchmarks.all().len() + awaited.clone().count();
-        let judged = all.saturating_sub(in_force.unknown().len());
-        let mut of_site = self.site.update(rule, now, in_force, judged);
+        let unknown = in_force.unknown().iter();
+        let unknown: Vec<&BenchmarkId> = unknown.chain(awaited).collect();
+        let counts = (unknown.len(), all);
+        let mut of_site = self.site.update(rule, now, in_force, counts);
         if is_changed || levels().any(|level| level == Level::Unknown) {
-            let unknown = in_force.unknown().iter();
-            let unknown: Vec<&BenchmarkId> = unknown.chain(awaited).collect();
             of_site.extend(self.site.update_unknown(rule, now, &unknown, all));
         }
         of_site

@@ -92,7 +92,9 @@ pub enum TimeFault {
     ShortYear,
     /// It is no number of days since 1900.
     NotExcel,
-    /// It may be such a number of days, where none was expected.
+    /// It is no number of days since 1858-11-17.
+    NotJulian,
+    /// It may be a number of days since 1900, where none was expected.
     LikeExcel,
     /// It may be such a number of seconds, where none was expected.
     LikeUnix,
@@ -133,8 +135,11 @@ impl TimeFault {
                 "a year of four digits, as %Y in time_format (--time-format) says; %y for two"
             }
             Self::NotExcel => "days since 1900, as time_format (--time-format) = excel says",
+            Self::NotJulian => {
+                "modified Julian days, days since 1858-11-17, as time_format (--time-format) = mjd says; a Julian date is 2400000.5 more"
+            }
             Self::LikeExcel => {
-                "an RFC 3339 time; if this is a date of Excel's, set time_format (--time-format) to excel"
+                "an RFC 3339 time; if this is a date of Excel's, set time_format (--time-format) to excel, if a modified Julian date, to mjd"
             }
             Self::LikeUnix => {
                 "an RFC 3339 time; if these are seconds since 1970, set time_format (--time-format) to unix, for milliseconds to unix_ms"

@@ -82,6 +82,10 @@ impl Dialect {
                 let local = days.and_then(excel_date).ok_or(TimeFault::NotExcel)?;
                 clock.of_local(local)
             }
+            TimeFormat::JulianDays => {
+                let days = self.number(text).filter(|days| JULIAN_DAYS.contains(days));
+                from_julian_days(days.ok_or(TimeFault::NotJulian)?)
+            }
         }
     }
 
@@ -289,6 +293,8 @@ pub enum TimeFormat {
     UnixMilliseconds,
     /// Days since 1899-12-30 on the local clock, as Excel keeps a date.
     ExcelDays,
+    /// Modified Julian days: days since 1858-11-17T00:00:00Z, as GNSS solutions are dated.
+    JulianDays,
 }
 
 /// The year 5138; what is larger is not in seconds.
@@ -299,13 +305,17 @@ const SECONDS_OF_NOW: std::ops::Range<f64> = 1e8..1e10;
 const FIRST_LONG_YEAR: i16 = 100;
 /// From 1900 to 2173.
 const EXCEL_DAYS: std::ops::Range<f64> = 1.0..100_000.0;
+/// From 1900 to 2173.
+const JULIAN_DAYS: std::ops::Range<f64> = 15_020.0..115_000.0;
+/// Seconds from day 0 of the modified Julian days to 1970.
+const JULIAN_SECONDS: f64 = 40_587.0 * super::SECONDS_PER_DAY;
 /// Day 0 of Excel's dates after February 1900.
 const EXCEL_EPOCH: Date = Date::constant(1899, 12, 30);
 /// An instant that every part of a pattern can write.
 const TRIAL: DateTime = DateTime::constant(2017, 11, 23, 17, 46, 39, 0);
 
 impl TimeFormat {
-    /// Parses `rfc3339`, `unix`, `unix_ms`, `excel` or a pattern of `%Y %m %d %H %M %S`.
+    /// Parses `rfc3339`, `unix`, `unix_ms`, `excel`, `mjd` or a pattern of `%Y %m %d %H %M %S`.
     ///
     /// # Errors
     /// What to write instead.
@@ -315,10 +325,11 @@ impl TimeFormat {
             "unix" => Ok(Self::UnixSeconds),
             "unix_ms" => Ok(Self::UnixMilliseconds),
             "excel" => Ok(Self::ExcelDays),
+            "mjd" => Ok(Self::JulianDays),
             pattern if is_pattern(pattern) => Ok(Self::Pattern(pattern.to_owned())),
             _ => Err(
                 "write a pattern with day, month and year, such as \"%d.%m.%Y %H:%M\" or \"%m/%d/%Y %I:%M %p\", \
-                 or one of rfc3339, unix, unix_ms, excel"
+                 or one of rfc3339, unix, unix_ms, excel, mjd"
                     .to_owned(),
             ),
         }
@@ -375,6 +386,13 @@ fn from_milliseconds(milliseconds: Option<f64>) -> Option<Timestamp> {
     )]
     let milliseconds = milliseconds as i64;
     Timestamp::from_millisecond(milliseconds).ok()
+}
+
+/// To the nearest second, as a day is given to five decimals.
+fn from_julian_days(days: f64) -> Result<Timestamp, TimeFault> {
+    #[expect(clippy::cast_possible_truncation, reason = "bounded by JULIAN_DAYS")]
+    let second = (days * super::SECONDS_PER_DAY - JULIAN_SECONDS).round() as i64;
+    Timestamp::from_second(second).map_err(|_| TimeFault::NotJulian)
 }
 
 /// To the nearest second: a day is kept as a number of 15 digits.
@@ -480,6 +498,9 @@ mod tests {
             ("unix_ms", "60000", "1970-01-01T00:01:00Z"),
             ("excel", "42922.708333333", "2017-07-06T15:00:00Z"),
             ("excel", "1499353200", "NotExcel"),
+            ("mjd", "57940.625", "2017-07-06T15:00:00Z"),
+            ("mjd", "57940.62501", "2017-07-06T15:00:01Z"),
+            ("mjd", "2457941.125", "NotJulian"),
             ("rfc3339", "06/07/2017 17:00", "LikeDayOrMonthFirst"),
             ("rfc3339", "42922.7083", "LikeExcel"),
             ("rfc3339", "1499353200", "LikeUnix"),

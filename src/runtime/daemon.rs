@@ -286,7 +286,7 @@ impl Daemon {
                 let more = waiting.iter().flat_map(|one| &one.arrivals);
                 prepared = self.site.prepare(delivery.arrivals.iter().chain(more));
             }
-            for arrival in &delivery.arrivals {
+            for arrival in self.site.not_outdated(&delivery)? {
                 self.take(arrival)?;
                 self.commit_what_is_urgent()?;
             }
@@ -478,7 +478,7 @@ impl Daemon {
         self.note_up_to_date()?;
         self.thin()?;
         self.verify();
-        self.note_quarantined()?;
+        self.note_sources()?;
         self.keep_faults();
         let (outbox, oldest) = self.store.outbox(&self.config.later_hooks())?;
         let bytes = self.store.bytes()?;

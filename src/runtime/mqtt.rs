@@ -4,6 +4,7 @@
 //! acknowledged when the process or the connection ended comes again.
 
 mod publish;
+mod refused;
 mod session;
 
 pub(super) use publish::MQTT_OUT;
@@ -15,6 +16,9 @@ use super::service_faults::{FaultPlace, ServiceFaultKind, ServiceFaults};
 use super::shutdown::Shutdown;
 use super::tail::{Arrival, Decoder};
 use crate::config::{Benchmark, Broker};
+use crate::monitor::Input;
+use crate::reading::Timestamp;
+use refused::RefusedTopics;
 use session::{BrokerMessage, NoConnection, Session, SessionEvent};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -31,18 +35,38 @@ const RECONNECT: (Duration, Duration) = (Duration::from_secs(1), Duration::from_
 /// After so long with a subscription what the broker kept for us is coming in.
 const SETTLED: Duration = Duration::from_secs(2);
 
-/// Since when the subscription with a broker stands; it may come late, and with it what was sent while the daemon was off.
-#[derive(Debug, Clone, Default)]
-pub struct Subscription(Arc<OnceLock<Stopwatch>>);
+/// As whom a source subscribes, and since when the subscription stands; it may come late, and with it what was sent while the daemon was off.
+#[derive(Debug, Clone)]
+pub struct Subscription {
+    /// The session's name: one for each daemon and source, and always the same.
+    pub client: String,
+    /// Whether the broker has granted it to an earlier run: it should have kept the session.
+    pub is_known: bool,
+    since: Arc<OnceLock<Stopwatch>>,
+}
 
 impl Subscription {
-    fn stands(&self) {
-        self.0.get_or_init(Stopwatch::start);
+    /// One that does not stand yet.
+    pub fn new(client: String, is_known: bool) -> Self {
+        Self {
+            client,
+            is_known,
+            since: Arc::default(),
+        }
+    }
+
+    fn begin(&self) {
+        self.since.get_or_init(Stopwatch::start);
+    }
+
+    /// Whether the broker has granted it.
+    pub(super) fn stands(&self) -> bool {
+        self.since.get().is_some()
     }
 
     /// Whether it has stood for so long that what the broker kept for us is coming in.
     pub(super) fn has_settled(&self) -> bool {
-        let since = self.0.get();
+        let since = self.since.get();
         since.is_some_and(|since| since.elapsed() >= SETTLED)
     }
 }
@@ -58,6 +82,8 @@ pub struct ReceivedMessage {
     pub found: Stopwatch,
     /// Lines in it that cannot be used; one where nothing in it is for this site.
     pub quarantined: u64,
+    /// Whether the broker keeps it for whoever subscribes, so that it comes again.
+    pub is_retained: bool,
     /// To be given back once that is durable.
     pub receipt: Receipt,
     /// Its share of what may wait to be taken.
@@ -73,6 +99,8 @@ pub struct Receipt(Of);
 enum Of {
     Message(Box<BrokerMessage>),
     Number(u64, mpsc::UnboundedSender<u64>),
+    /// No message.
+    Nothing,
 }
 
 impl Receipt {
@@ -94,33 +122,33 @@ impl Receipt {
                 let _ = acknowledged.send(number);
                 Ok(())
             }
+            Of::Nothing => Ok(()),
         }
     }
 }
 
 /// Takes the broker's messages until `shutdown` is asked for or nobody takes the deliveries any
-/// more; a connection that breaks is made again. `client_id` names the session: one for each daemon
-/// and source, and always the same.
+/// more; a connection that breaks is made again. Where the broker has not kept a session that it had granted, this is said
+/// as a possible gap.
 pub async fn follow(
     broker: Broker,
     benchmarks: Vec<Benchmark>,
-    client_id: String,
     deliveries: mpsc::Sender<ReceivedMessage>,
     faults: ServiceFaults,
     subscription: Subscription,
     mut shutdown: Shutdown,
 ) {
-    let [unreachable, refused] = [
-        ServiceFaultKind::BrokerUnreachable,
-        ServiceFaultKind::SubscriptionRefused,
-    ]
-    .map(|kind| FaultPlace::of_source(kind, &broker.id));
-    let mut session = Session::new(broker.clone(), client_id);
+    use ServiceFaultKind::{BrokerUnreachable, MessagesRefused, SubscriptionRefused};
+    let [unreachable, refused, useless] = [BrokerUnreachable, SubscriptionRefused, MessagesRefused]
+        .map(|kind| FaultPlace::of_source(kind, &broker.id));
+    let mut session = Session::new(broker.clone(), subscription.client.clone());
+    let mut was_granted = subscription.is_known;
     let mut reader = Reader {
         source: broker.id.clone(),
         filter: broker.topic.clone(),
         decoder: Decoder::of_messages(&broker, &benchmarks),
         quarantined: 0,
+        refused: RefusedTopics::default(),
     };
     let room = Arc::new(Semaphore::new(MOST_VALUES as usize));
     let mut wait = RECONNECT.0;
@@ -129,9 +157,11 @@ pub async fn follow(
             biased;
             () = shutdown.requested() => return,
             came = session.next() => match came {
-                Ok(SessionEvent::Connected) => {
-                    let version = session.version();
-                    tracing::info!(source = broker.id, ?broker.address, version, "connected");
+                Ok(SessionEvent::Connected { is_kept }) => {
+                    tracing::info!(source = broker.id, ?broker.address, version = session.version(), "connected");
+                    if was_granted && !is_kept {
+                        let _ = deliveries.send(possible_gap(&broker.id)).await;
+                    }
                     wait = RECONNECT.0;
                     faults.is_over(&unreachable);
                     // Again each time: a broker that lost its sessions has forgotten it.
@@ -141,6 +171,7 @@ pub async fn follow(
                 }
                 Ok(SessionEvent::Message(message)) => {
                     let delivery = reader.delivery(message);
+                    reader.refused.report(&faults, &useless);
                     tokio::select! {
                         sent = send(delivery, &room, &deliveries) => if sent.is_err() { return },
                         () = shutdown.requested() => return,
@@ -148,7 +179,8 @@ pub async fn follow(
                 }
                 Ok(SessionEvent::Subscribed) => {
                     faults.is_over(&refused);
-                    subscription.stands();
+                    was_granted = true;
+                    subscription.begin();
                 }
                 Ok(SessionEvent::SubscriptionRefused) => {
                     let (source, topic) = (&broker.id, &broker.topic);
@@ -157,9 +189,8 @@ pub async fn follow(
                     tracing::error!(source, topic, ?RECONNECT, "the broker refuses the subscription: nothing comes from it");
                     // Asked again after a while: its rules may be others then.
                     session.disconnect();
-                    tokio::select! {
-                        () = tokio::time::sleep(RECONNECT.1) => {}
-                        () = shutdown.requested() => return,
+                    if !waits(RECONNECT.1, &mut shutdown).await {
+                        return;
                     }
                 }
                 Ok(SessionEvent::Nothing) => {}
@@ -167,9 +198,8 @@ pub async fn follow(
                     tracing::warn!(source = broker.id, %error, ?wait, "no connection; will connect again");
                     let (host, port) = (&broker.address.host, broker.address.port);
                     faults.lasts(unreachable.clone(), &format!("no connection to {host}:{port}: {error}"));
-                    tokio::select! {
-                        () = tokio::time::sleep(wait) => {}
-                        () = shutdown.requested() => return,
+                    if !waits(wait, &mut shutdown).await {
+                        return;
                     }
                     wait = (2 * wait).min(RECONNECT.1);
                 }
@@ -189,8 +219,8 @@ pub(super) async fn try_out(broker: &Broker) -> Result<(), String> {
     loop {
         match session.next().await {
             // One more of those who share a subscription would take messages from the others.
-            Ok(SessionEvent::Connected) if broker.topic.starts_with("$share/") => break,
-            Ok(SessionEvent::Connected) => {
+            Ok(SessionEvent::Connected { .. }) if broker.topic.starts_with("$share/") => break,
+            Ok(SessionEvent::Connected { .. }) => {
                 (session.subscribe(&broker.topic)).map_err(|error| error.to_string())?;
             }
             Ok(SessionEvent::Subscribed) => break,
@@ -213,6 +243,55 @@ pub(super) async fn try_out(broker: &Broker) -> Result<(), String> {
     Ok(())
 }
 
+/// Waits for so long; whether to go on then.
+async fn waits(span: Duration, shutdown: &mut Shutdown) -> bool {
+    tokio::select! {
+        () = tokio::time::sleep(span) => true,
+        () = shutdown.requested() => false,
+    }
+}
+
+/// That messages of `source` may be missing: the broker did not keep the session for which it was to keep them.
+fn possible_gap(source: &str) -> ReceivedMessage {
+    tracing::warn!(
+        source,
+        "the broker has not kept the session: messages may be missing"
+    );
+    let text = format!(
+        "source {source}: the broker has not kept the session of this daemon; what was sent while there was no connection may be missing"
+    );
+    unreceived(source, text)
+}
+
+/// That messages may be missing which a broker keeps for sources that the config does not have any more.
+pub(super) fn left_with_broker(sources: &[(String, String)]) -> ReceivedMessage {
+    let named = sources.iter();
+    let named = named.map(|(source, client)| format!("{source} (client {client:?})"));
+    let text = format!(
+        "the config does not have these sources any more, and others instead: {}; what their brokers keep for them is not taken. \
+         A source of another id is another session",
+        named.collect::<Vec<String>>().join(", ")
+    );
+    tracing::warn!("{text}");
+    unreceived(sources.first().map_or("", |(source, _)| source), text)
+}
+
+fn unreceived(source: &str, text: String) -> ReceivedMessage {
+    let kind = "possible-gap".to_owned();
+    ReceivedMessage {
+        arrivals: vec![Arrival {
+            time: Timestamp::MIN,
+            input: Input::Trouble { kind, text },
+        }],
+        source: source.to_owned(),
+        found: Stopwatch::start(),
+        quarantined: 0,
+        is_retained: false,
+        receipt: Receipt(Of::Nothing),
+        room: None,
+    }
+}
+
 /// Sends it when there is room for its values.
 async fn send(
     mut delivery: ReceivedMessage,
@@ -233,6 +312,7 @@ struct Reader {
     decoder: Decoder,
     /// Lines and whole messages that could not be used.
     quarantined: u64,
+    refused: RefusedTopics,
 }
 
 impl Reader {
@@ -245,6 +325,7 @@ impl Reader {
             source: self.source.clone(),
             found,
             quarantined,
+            is_retained: message.is_retained(),
             receipt: Receipt(Of::Message(Box::new(message))),
             room: None,
         }
@@ -278,6 +359,8 @@ impl Reader {
         if arrivals.is_empty() && faults.is_empty() {
             faults.push(GivesNothing.into());
         }
+        let first = faults.first().map(|fault| &**fault);
+        self.refused.note(topic, !arrivals.is_empty(), first);
         (arrivals, self.set_aside(topic, &faults))
     }
 
@@ -349,6 +432,7 @@ mod tests {
             filter: broker.topic.clone(),
             decoder: Decoder::of_messages(broker, &config.benchmarks),
             quarantined: 0,
+            refused: RefusedTopics::default(),
         };
         let (arrivals, quarantined) = reader.read("site/P1/displacement", payload.as_bytes());
         assert_eq!(reader.quarantined, quarantined);

@@ -42,13 +42,15 @@ pub enum ServiceFaultKind {
     FileRefused,
     /// Take the last row of a file, which has no line break.
     RowUnended,
-    /// Use any of the newest rows of a file.
+    /// Use any of the newest rows of a file, or messages of a recording.
     RowsRefused,
+    /// Use any of the newest messages of a broker.
+    MessagesRefused,
 }
 
 impl ServiceFaultKind {
     /// Each of them.
-    pub(super) const ALL: [Self; 9] = [
+    pub(super) const ALL: [Self; 10] = [
         Self::StateUnwritable,
         Self::BrokerUnreachable,
         Self::SubscriptionRefused,
@@ -57,6 +59,7 @@ impl ServiceFaultKind {
         Self::FileRefused,
         Self::RowUnended,
         Self::RowsRefused,
+        Self::MessagesRefused,
         Self::HookFailing,
     ];
 
@@ -71,6 +74,7 @@ impl ServiceFaultKind {
             Self::FileRefused => "file-refused",
             Self::RowUnended => "row-unended",
             Self::RowsRefused => "rows-refused",
+            Self::MessagesRefused => "messages-refused",
             Self::HookFailing => "hook-failing",
         }
     }
@@ -81,6 +85,7 @@ impl ServiceFaultKind {
             Self::StateUnwritable
             | Self::BrokerUnreachable
             | Self::SubscriptionRefused
+            | Self::MessagesRefused
             | Self::HookFailing => false,
             Self::FolderUnreadable
             | Self::FileUnreadable

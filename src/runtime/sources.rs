@@ -36,8 +36,8 @@ pub struct Sources {
     unacknowledged: Vec<Receipt>,
     /// Held, so that without a broker the other end waits.
     _messages: mpsc::Sender<ReceivedMessage>,
-    /// Of each broker; and since when they are followed.
-    subscriptions: Vec<Subscription>,
+    /// Of each broker, by its source; and since when they are followed.
+    subscriptions: Vec<(String, Subscription)>,
     started: Stopwatch,
     /// Stops them, also when it is dropped.
     stop: Trigger,
@@ -54,7 +54,7 @@ impl Sources {
         faults.forget_sources();
         let (messages, deliveries) = mpsc::channel(MESSAGES);
         let (stop, stopped) = shutdown::pair();
-        let subscriptions = listen(config, store.instance()?, &messages, &stopped, faults);
+        let subscriptions = listen(config, store, &messages, &stopped, faults)?;
         let follower = Follower::new(&config.sources, &config.benchmarks, &store.positions()?);
         let (sender, batches) = mpsc::channel(BATCHES);
         let task = tokio::spawn(tail::follow(follower, sender, faults.clone(), stopped));
@@ -85,8 +85,19 @@ impl Sources {
 
     /// Whether each broker sends what it kept for us, or has had its time to.
     pub(super) fn have_begun(&self) -> bool {
-        self.subscriptions.iter().all(Subscription::has_settled)
-            || self.started.elapsed() >= LONGEST_SILENT
+        let mut each = self.subscriptions.iter();
+        each.all(|(_, one)| one.has_settled()) || self.started.elapsed() >= LONGEST_SILENT
+    }
+
+    /// Notes in `store` which brokers have granted a session, so that a later run knows that it should have been kept.
+    pub(super) fn note_sessions(&mut self, store: &Store) -> Result<(), StoreError> {
+        for (source, one) in &mut self.subscriptions {
+            if one.stands() && !one.is_known {
+                store.note_broker_session(source, &one.client)?;
+                one.is_known = true;
+            }
+        }
+        Ok(())
     }
 
     /// Asks them to stop; what they have read already can still be taken.
@@ -149,29 +160,45 @@ impl Sources {
 /// Follows the brokers; the subscription with each.
 fn listen(
     config: &Config,
-    instance: i64,
+    store: &Store,
     messages: &mpsc::Sender<ReceivedMessage>,
     stopped: &Shutdown,
     faults: &ServiceFaults,
-) -> Vec<Subscription> {
+) -> Result<Vec<(String, Subscription)>, StoreError> {
+    let (instance, known) = (store.instance()?, store.broker_sessions()?);
     let each = config.brokers.iter().map(|broker| {
         // One session for each state and source, found again after a restart. Two daemons of one site's name would
         // each get a part of the messages.
-        let client = format!(
-            "slipwatch-{}-{}-{instance:016x}",
-            config.site.name, broker.id
-        );
-        let subscription = Subscription::default();
+        let fresh = || {
+            let (site, source) = (&config.site.name, &broker.id);
+            format!("slipwatch-{site}-{source}-{instance:016x}")
+        };
+        let client = known.get(&broker.id).cloned();
+        let is_known = client.is_some();
+        let subscription = Subscription::new(client.unwrap_or_else(fresh), is_known);
         tokio::spawn(mqtt::follow(
             broker.clone(),
             config.benchmarks.clone(),
-            client,
             messages.clone(),
             faults.clone(),
             subscription.clone(),
             stopped.clone(),
         ));
-        subscription
+        (broker.id.clone(), subscription)
     });
-    each.collect()
+    let each: Vec<(String, Subscription)> = each.collect();
+    let is_of_config = |source: &String| config.brokers.iter().any(|broker| broker.id == *source);
+    let gone = known
+        .into_iter()
+        .filter(|(source, _)| !is_of_config(source));
+    let gone: Vec<(String, String)> = gone.collect();
+    for (source, _) in &gone {
+        store.forget_broker_session(source)?;
+    }
+    // A source that was only taken out is missed by nobody.
+    if !gone.is_empty() && each.iter().any(|(_, one)| !one.is_known) {
+        let (gap, messages) = (mqtt::left_with_broker(&gone), messages.clone());
+        tokio::spawn(async move { messages.send(gap).await.is_ok() });
+    }
+    Ok(each)
 }

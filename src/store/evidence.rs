@@ -140,7 +140,7 @@ impl Store {
         copy.execute_batch(
             "DELETE FROM event; DELETE FROM latest; DELETE FROM position; DELETE FROM memory;
              DELETE FROM outbox; DELETE FROM thinned; DELETE FROM command; DELETE FROM meta;
-             DELETE FROM used_link;
+             DELETE FROM used_link; DELETE FROM broker_session;
              VACUUM;",
         )?;
         drop(copy);

@@ -6,6 +6,7 @@
 
 mod access;
 mod batch;
+mod broker;
 mod checkpoint;
 mod evidence;
 mod known;

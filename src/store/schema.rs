@@ -7,7 +7,7 @@ use rusqlite::Connection;
 const APPLICATION: i32 = 0x736c_6970;
 
 /// One step for each version: `MIGRATIONS[n]` leads from version n to n + 1.
-const MIGRATIONS: [&str; 7] = ["
+const MIGRATIONS: [&str; 8] = ["
     CREATE TABLE series (
         id INTEGER PRIMARY KEY,
         -- 0: a covariate; 1: readings of a benchmark
@@ -116,6 +116,13 @@ const MIGRATIONS: [&str; 7] = ["
 "
     ALTER TABLE series ADD COLUMN sum INTEGER;
     ALTER TABLE latest ADD COLUMN sum INTEGER;
+",
+// As whom the session with the broker of each source is held: it stays the same where the site is renamed.
+"
+    CREATE TABLE broker_session (
+        source TEXT PRIMARY KEY,
+        client TEXT NOT NULL
+    ) STRICT, WITHOUT ROWID;
 "];
 
 /// From this version on each series, and each of the newest events, has a sum.

@@ -71,7 +71,7 @@ fn a_crisis_is_one_page_with_its_figures_levels_search_scorecard_and_sources_and
     });
     let mut count = 0;
     for alert in alerts {
-        let minute = format!("{}Z", &alert["time"].as_str().unwrap()[..16]);
+        let minute = alert["time"].as_str().unwrap()[..16].replace('T', " ") + "Z";
         assert!(
             page.contains(&format!("<tr><td>{minute}</td><td>alert</td>")),
             "{alert}"

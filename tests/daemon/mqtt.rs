@@ -2,6 +2,7 @@
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
+    clippy::wildcard_enum_match_arm,
     reason = "a test fails by panicking"
 )]
 
@@ -106,6 +107,11 @@ impl Mosquitto {
 
     /// Publishes and waits until the broker has it all.
     async fn publish(&self, payloads: &[String]) {
+        self.publish_as(payloads, false).await;
+    }
+
+    /// The same; where it is retained the broker keeps the last one for whoever subscribes.
+    async fn publish_as(&self, payloads: &[String], is_retained: bool) {
         let mut options = MqttOptions::new("writer", "127.0.0.1", self.port);
         options.set_max_packet_size(1 << 20, 1 << 20);
         let (client, mut connection) = AsyncClient::new(options, 100);
@@ -114,7 +120,7 @@ impl Mosquitto {
                 .publish(
                     "site/5/displacement",
                     QoS::AtLeastOnce,
-                    false,
+                    is_retained,
                     payload.as_bytes(),
                 )
                 .await
@@ -187,18 +193,20 @@ impl Source {
     }
 
     fn of_session(config: Config, id: &str) -> Self {
+        Self::of_subscription(config, Subscription::new(id.to_owned(), false))
+    }
+
+    fn of_subscription(config: Config, subscription: Subscription) -> Self {
         let (sender, deliveries) = mpsc::channel(8);
         let (stop, stopped) = shutdown::pair();
         let radio = config.brokers[0].clone();
         let faults = ServiceFaults::default();
-        let id = id.to_owned();
         let follow = follow(
             radio,
             config.benchmarks,
-            id,
             sender,
             faults,
-            Subscription::default(),
+            subscription,
             stopped,
         );
         let task = tokio::spawn(follow);
@@ -272,6 +280,97 @@ async fn what_was_acknowledged_does_not_come_again_and_what_was_not_does() {
     }
     assert_eq!(came, [3.0, 4.0, 5.0, 6.0]);
     second.end().await;
+}
+
+/// What a message says of readings that may be missing.
+fn possible_gap(delivery: &ReceivedMessage) -> Option<&str> {
+    delivery.arrivals.iter().find_map(|one| match &one.input {
+        Input::Trouble { kind, text } if kind == "possible-gap" => Some(text.as_str()),
+        _ => None,
+    })
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn a_session_that_the_broker_has_not_kept_is_a_possible_gap_and_one_that_it_has_is_none() {
+    let broker = Mosquitto::start();
+    let known = |client: &str| Subscription::new(client.to_owned(), true);
+    let mut first = Source::start(&broker);
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    broker.publish(&[message(1)]).await;
+    let delivery = first.next().await;
+    assert_eq!(values(&delivery), [1.0]);
+    delivery.receipt.acknowledge().await.unwrap();
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    first.end().await;
+    broker.publish(&[message(2)]).await;
+    let config = || config_at(broker.port);
+    let mut kept = Source::of_subscription(config(), known("slipwatch-toc-radio"));
+    assert_eq!(values(&kept.next().await), [2.0]);
+    kept.end().await;
+    let mut lost = Source::of_subscription(config(), known("slipwatch-toc-lost"));
+    let delivery = lost.next().await;
+    let text = possible_gap(&delivery).unwrap();
+    assert!(
+        text.contains("source radio: the broker has not kept"),
+        "{text}"
+    );
+    lost.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn a_site_that_is_renamed_keeps_its_session_and_a_source_that_is_renamed_is_a_possible_gap() {
+    let broker = Mosquitto::start();
+    let mut daemon = Daemon::start(&broker);
+    let is_noted = |daemon: &Daemon| {
+        let store = slipwatch::store::Store::look(&daemon.0.path().join("state"));
+        store.is_ok_and(|store| !store.broker_sessions().unwrap().is_empty())
+    };
+    daemon.wait("the session is noted", is_noted);
+    daemon.stop();
+    broker.publish(&[message(1)]).await;
+    daemon.restart_as("name = \"Toc\"", "name = \"Toc, west\"");
+    daemon.wait("what was kept comes", |daemon| daemon.readings() == 1);
+    daemon.stop();
+    assert!(
+        !daemon.text("log").contains("kept"),
+        "{}",
+        daemon.text("log")
+    );
+    daemon.restart_as("id = \"radio\"", "id = \"wireless\"");
+    let events =
+        |daemon: &Daemon| daemon.printed(&["events", "--config", "site.toml", "--format", "json"]);
+    daemon.wait("what may be missing is said", |daemon| {
+        let events = events(daemon);
+        events.contains("possible-gap") && events.contains("radio (client")
+    });
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn a_message_that_the_broker_keeps_does_not_undo_a_correction() {
+    let broker = Mosquitto::start();
+    let mut daemon = Daemon::start(&broker);
+    daemon.wait("at work", |daemon| daemon.text("log").contains("connected"));
+    let of_day = |day: usize, value: f64| {
+        let text = message(day);
+        text.replace(&format!(":{day},"), &format!(":{value},"))
+    };
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    broker.publish(&[of_day(1, 1.0), of_day(2, 2.0)]).await;
+    daemon.wait("both are read", |daemon| daemon.readings() == 2);
+    broker.publish_as(&[of_day(2, 900.0)], true).await;
+    daemon.wait("a wrong one", |daemon| daemon.readings() == 3);
+    broker.publish(&[of_day(2, 2.5)]).await;
+    daemon.wait("it is corrected", |daemon| daemon.readings() == 4);
+    daemon.stop();
+    daemon.restart_as("", "");
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    broker.publish(&[of_day(3, 3.0)]).await;
+    daemon.wait("the next one", |daemon| daemon.readings() == 5);
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    assert_eq!(daemon.newest_of("2017-06-02T00:00:00Z"), Some(2.5));
 }
 
 /// Publishes a message of 17 MiB, and a reading after it.
@@ -391,10 +490,9 @@ async fn messages_of_many_lines_wait_at_the_broker_until_those_before_have_been_
     let task = tokio::spawn(follow(
         radio,
         config.benchmarks,
-        "wide".to_owned(),
         sender,
         ServiceFaults::default(),
-        Subscription::default(),
+        Subscription::new("wide".to_owned(), false),
         stopped,
     ));
     tokio::time::sleep(Duration::from_millis(1500)).await;
@@ -480,14 +578,46 @@ impl Daemon {
             broker.port
         );
         std::fs::write(folder.path().join("site.toml"), text).unwrap();
-        let log = std::fs::File::create(folder.path().join("log")).unwrap();
-        let process = Command::new(PROGRAM)
+        let process = Self::spawn(folder.path());
+        Self(folder, process)
+    }
+
+    fn spawn(folder: &Path) -> Child {
+        let log = std::fs::File::create(folder.join("log")).unwrap();
+        Command::new(PROGRAM)
             .args(["run", "site.toml"])
-            .current_dir(folder.path())
+            .current_dir(folder)
             .stderr(log)
             .stdout(Stdio::null())
-            .spawn();
-        Self(folder, process.unwrap())
+            .spawn()
+            .unwrap()
+    }
+
+    /// Ends it in order.
+    fn stop(&mut self) {
+        let id = self.1.id().to_string();
+        assert!(Command::new("kill").arg(id).status().unwrap().success());
+        self.1.wait().unwrap();
+    }
+
+    /// Starts it again, with a config in which one text is another.
+    fn restart_as(&mut self, text: &str, other: &str) {
+        let file = self.0.path().join("site.toml");
+        std::fs::write(&file, self.text("site.toml").replacen(text, other, 1)).unwrap();
+        self.1 = Self::spawn(self.0.path());
+    }
+
+    /// The value that counts of a time.
+    fn newest_of(&self, time: &str) -> Option<f64> {
+        let store = slipwatch::store::Store::look(&self.0.path().join("state")).unwrap();
+        let steps = store.steps(0).unwrap();
+        let value = |input: &Input| match input {
+            Input::Reading { reading, .. } if reading.time.to_string() == time => {
+                Some(reading.value)
+            }
+            _ => None,
+        };
+        steps.iter().rev().find_map(|step| value(&step.input))
     }
 
     fn text(&self, name: &str) -> String {

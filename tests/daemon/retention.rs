@@ -282,12 +282,12 @@ fn a_later_versions_tables_are_refused_and_an_empty_file_gets_ours() {
     let version: i64 = connection
         .pragma_query_value(None, "user_version", |row| row.get(0))
         .unwrap();
-    assert_eq!(version, 7);
-    connection.pragma_update(None, "user_version", 8).unwrap();
+    assert_eq!(version, 8);
+    connection.pragma_update(None, "user_version", 9).unwrap();
     drop(connection);
     for refused in [Store::open(folder.path()), Store::look(folder.path())] {
         assert!(
-            matches!(refused, Err(StoreError::Newer { version: 8 })),
+            matches!(refused, Err(StoreError::Newer { version: 9 })),
             "{refused:?}"
         );
     }
@@ -303,7 +303,7 @@ fn tables_of_the_version_before_are_brought_up_and_what_they_hold_stays() {
         "DROP INDEX event_at; ALTER TABLE step DROP COLUMN sum; ALTER TABLE event DROP COLUMN sum;
                   ALTER TABLE outbox DROP COLUMN sum;
                   ALTER TABLE series DROP COLUMN sum; ALTER TABLE latest DROP COLUMN sum;
-                  ALTER TABLE outbox DROP COLUMN noted; DROP TABLE used_link;
+                  ALTER TABLE outbox DROP COLUMN noted; DROP TABLE used_link; DROP TABLE broker_session;
                   INSERT INTO step (seq, now) VALUES (1, 5); PRAGMA user_version = 1;";
     connection.execute_batch(before).unwrap();
     drop(connection);

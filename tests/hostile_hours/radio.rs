@@ -106,6 +106,7 @@ fn delivery(number: u64, measured: &Measured, sender: &UnboundedSender<u64>) -> 
         source: "radio".to_owned(),
         found: Stopwatch::start(),
         quarantined: 0,
+        is_retained: false,
         receipt: Receipt::numbered(number, sender.clone()),
         room: None,
     }

@@ -9,7 +9,7 @@
 use jiff::ToSpan;
 use slipwatch::alert::{Level, Policy, Threshold};
 use slipwatch::monitor::{
-    AlertState, Event, EventKind, Input, Monitor, Settings, SiteLevel, Watched,
+    AlertState, Event, EventKind, Input, Monitor, Notice, Settings, SiteLevel, Watched,
 };
 use slipwatch::reading::{BenchmarkId, Reading, Timestamp, Unit};
 use std::collections::BTreeSet;
@@ -137,4 +137,28 @@ fn where_fewer_can_be_judged_than_the_rule_asks_for_all_of_those_make_the_site()
     };
     assert!(!red_after(100), "the third can be judged and is not red");
     assert!(red_after(30), "of the third nothing can be said any more");
+}
+
+#[test]
+fn benchmarks_that_have_never_read_cannot_be_judged_and_those_that_do_make_the_site() {
+    let named = ["a", "b", "c"].map(BenchmarkId::new);
+    let red_with = |reading: &[&str]| {
+        let mut monitor = Monitor::new(Settings {
+            watched: Watched {
+                named: named.clone().into(),
+                is_open: false,
+                ..Watched::default()
+            },
+            ..settings(Some(SiteLevel::AtLeast(2)))
+        });
+        for id in reading {
+            read(&mut monitor, id, 0, 0.0);
+        }
+        monitor.step(start(), &Input::Notice(Notice::Watching));
+        let said = of_the_site(&read(&mut monitor, "a", 1, 30.0));
+        said.iter()
+            .any(|(level, state, _)| (*level, *state) == (Level::Red, AlertState::Firing))
+    };
+    assert!(!red_with(&["a", "b"]), "b can be judged and is not red");
+    assert!(red_with(&["a"]), "nothing can be said of b and c");
 }

@@ -7,6 +7,7 @@ mod held;
 mod inherited;
 mod long;
 mod marks;
+mod numbers;
 mod said;
 mod text;
 mod times;

@@ -1,11 +1,11 @@
 //! Which columns of a table give the time, and how it is written there.
 
 use super::clock;
+use super::numbers::{of_days, of_numbers};
 use crate::cli::args::DialectArgs;
 use crate::reading::{DecimalMark, Dialect, LocalClock, SummerTime, TimeFormat, Timestamp};
 use crate::runtime::ingest::Survey;
 use jiff::SignedDuration;
-use jiff::fmt::strtime::BrokenDownTime;
 use jiff::tz::TimeZone;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,15 +26,6 @@ const TIMES: [&str; 6] = [
 ];
 /// The same without colons, after a year of four digits: behind two of them a blank need not stand, and `2017` would be a year and an hour.
 const TIMES_WITHOUT_COLONS: [&str; 5] = [" %H%M", " %H%M%S", " %H.%M", " %Hh%M", " %H"];
-/// Dates and times in one row of digits, by the number of these.
-const COMPACT: [(usize, &str); 4] = [
-    (8, "%Y%m%d"),
-    (10, "%Y%m%d%H"),
-    (12, "%Y%m%d%H%M"),
-    (14, "%Y%m%d%H%M%S"),
-];
-/// The years in which a number of so many digits is taken for such a date.
-const COMPACT_YEARS: std::ops::Range<i16> = 1900..2100;
 /// Parts of names of columns whose numbers may be times of day.
 const NAMES_OF_TIMES_OF_DAY: [&str; 9] = [
     "time", "zeit", "uhr", "stunde", "ora", "heure", "hora", "hour", "hhmm",
@@ -42,9 +33,12 @@ const NAMES_OF_TIMES_OF_DAY: [&str; 9] = [
 /// The first cells, which exclude most candidates.
 const FIRST_CELLS: usize = 200;
 /// Parts of names of columns whose numbers may be times.
-const NAMES_OF_TIMES: [&str; 8] = [
-    "time", "date", "stamp", "datum", "zeit", "heure", "fecha", "data",
+const NAMES_OF_TIMES: [&str; 12] = [
+    "time", "date", "stamp", "datum", "zeit", "heure", "fecha", "data", "epoch", "unix", "mjd",
+    "julian",
 ];
+/// Columns of the header that an error shows with their first cell.
+const MOST_SHOWN: usize = 8;
 /// Cells that are no date, in a column of dates: a repeated header, a line of totals.
 const MOST_ODD: usize = 20;
 /// Steps of the times that are larger and go both ways show that they are in no order.
@@ -85,13 +79,15 @@ pub(super) fn find(
     let format = if let Some(format) = &stated.time_format {
         format.clone()
     } else {
+        let names = columns.iter().map(|at| survey.names[*at].as_str());
+        let names = names.collect::<Vec<&str>>().join(" and ");
         let found = format_of(&cells, decimal);
+        let found = found.and_then(|format| {
+            let newest = instants(&cells, &format, decimal).into_iter().max();
+            of_days(&names, first_of(&cells), format, newest)
+        });
         let found = found.and_then(|format| with_all_hours(&cells, format, decimal));
-        found.map_err(|problem| {
-            let names = columns.iter().map(|at| survey.names[*at].as_str());
-            let names: Vec<&str> = names.collect();
-            format!("column {:?}: {problem}", names.join(" and "))
-        })?
+        found.map_err(|problem| format!("column {names:?}: {problem}"))?
     };
     let names = columns.iter().map(|at| survey.names[*at].clone());
     let is_usual = |name: &String| name.eq_ignore_ascii_case("time");
@@ -118,7 +114,8 @@ fn with_all_hours(
         TimeFormat::Pattern(_)
         | TimeFormat::UnixSeconds
         | TimeFormat::UnixMilliseconds
-        | TimeFormat::ExcelDays => return Ok(format),
+        | TimeFormat::ExcelDays
+        | TimeFormat::JulianDays => return Ok(format),
     };
     let times = instants(cells, &format, decimal);
     match clock::of_twelve_hours(&times, pattern) {
@@ -201,10 +198,10 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
             [*date, *time].into_iter().chain(half).collect(),
         )),
         ([], _) => Err(format!(
-            "no column gives a time that is known; the header has {:?}: give --time-column NAME (twice where date and \
-             time stand in two), and --time-format, such as \"%d.%m.%Y %H:%M\"; where other lines stand before the header, \
-             --skip-lines COUNT",
-            survey.names
+            "no column gives a time that is known; the header has {}: give --time-column NAME (twice where date and \
+             time stand in two), and --time-format, such as \"%d.%m.%Y %H:%M\", in which a word such as CET stands as it does in the cells, with \
+             --time-zone; where other lines stand before the header, --skip-lines COUNT",
+            with_first_cells(survey)
         )),
         (several, of_day) => {
             let names = several
@@ -216,6 +213,23 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
                 names.collect::<Vec<&str>>().join(", ")
             ))
         }
+    }
+}
+
+/// The names of the columns, each with its first cell that holds something.
+fn with_first_cells(survey: &Survey) -> String {
+    let shown = survey.names.iter().zip(&survey.columns).take(MOST_SHOWN);
+    let shown = shown.map(|(name, cells)| {
+        let first = cells.iter().find(|cell| !cell.trim().is_empty());
+        first.map_or_else(
+            || format!("{name:?}"),
+            |cell| format!("{name:?} (such as {cell:?})"),
+        )
+    });
+    let shown: Vec<String> = shown.collect();
+    match survey.names.len().saturating_sub(MOST_SHOWN) {
+        0 => shown.join(", "),
+        others => format!("{} and {others} more", shown.join(", ")),
     }
 }
 
@@ -232,7 +246,8 @@ fn days_alone(survey: &Survey, date: usize, decimal: DecimalMark) -> Option<Stri
         | TimeFormat::Rfc3339
         | TimeFormat::UnixSeconds
         | TimeFormat::UnixMilliseconds
-        | TimeFormat::ExcelDays => None,
+        | TimeFormat::ExcelDays
+        | TimeFormat::JulianDays => None,
     });
     let patterns: Option<Vec<&str>> = patterns.collect();
     let pattern = *patterns?.first()?;
@@ -300,6 +315,10 @@ fn joined(survey: &Survey, columns: &[usize]) -> Vec<String> {
         .collect()
 }
 
+fn first_of(cells: &[String]) -> &str {
+    cells.first().map_or("", String::as_str)
+}
+
 /// The one way in which these are written.
 fn format_of(cells: &[String], decimal: DecimalMark) -> Result<TimeFormat, String> {
     if let Some(format) = of_numbers(cells, decimal) {
@@ -310,7 +329,7 @@ fn format_of(cells: &[String], decimal: DecimalMark) -> Result<TimeFormat, Strin
         [only] => Ok(only.clone()),
         [] => Err(format!(
             "times like {:?} are in no form that is known; give --time-format, such as \"%d.%m.%Y %H:%M\"",
-            cells.first().map_or("", String::as_str)
+            first_of(cells)
         )),
         several => {
             let flags = several
@@ -318,7 +337,7 @@ fn format_of(cells: &[String], decimal: DecimalMark) -> Result<TimeFormat, Strin
                 .map(|format| format!("--time-format {:?}", word(format)));
             Err(format!(
                 "dates like {:?} can be read in several ways, and no row decides; give {}",
-                cells.first().map_or("", String::as_str),
+                first_of(cells),
                 flags.collect::<Vec<String>>().join(" or ")
             ))
         }
@@ -356,45 +375,8 @@ pub(super) fn word(format: &TimeFormat) -> &str {
         TimeFormat::UnixSeconds => "unix",
         TimeFormat::UnixMilliseconds => "unix_ms",
         TimeFormat::ExcelDays => "excel",
+        TimeFormat::JulianDays => "mjd",
     }
-}
-
-fn of_numbers(cells: &[String], decimal: DecimalMark) -> Option<TimeFormat> {
-    if let Some(compact) = compact(cells) {
-        return Some(compact);
-    }
-    let dialect = reader(decimal, TimeFormat::Rfc3339);
-    let numbers: Option<Vec<f64>> = cells.iter().map(|cell| dialect.number(cell)).collect();
-    let numbers = numbers.filter(|numbers| !numbers.is_empty())?;
-    let all = |low: f64, high: f64| numbers.iter().all(|number| (low..high).contains(number));
-    if all(20_000.0, 80_000.0) {
-        Some(TimeFormat::ExcelDays)
-    } else if all(1e8, 1e10) {
-        Some(TimeFormat::UnixSeconds)
-    } else if all(1e11, 1e13) {
-        Some(TimeFormat::UnixMilliseconds)
-    } else {
-        None
-    }
-}
-
-/// The format of rows of digits that are all dates of one length: a count of seconds is one by chance now and then, but not in all rows.
-fn compact(cells: &[String]) -> Option<TimeFormat> {
-    let digits = cells.first()?.len();
-    let (_, pattern) = COMPACT.iter().find(|(count, _)| *count == digits)?;
-    let is_date = |cell: &String| {
-        let year = cell.get(..4).and_then(|year| year.parse().ok());
-        let read = BrokenDownTime::parse(pattern, cell);
-        let date = read.and_then(|read| read.to_date());
-        cell.len() == digits
-            && cell.bytes().all(|digit| digit.is_ascii_digit())
-            && year.is_some_and(|year| COMPACT_YEARS.contains(&year))
-            && date.is_ok_and(|date| Some(date.year()) == year)
-    };
-    cells
-        .iter()
-        .all(is_date)
-        .then(|| TimeFormat::Pattern((*pattern).to_owned()))
 }
 
 /// Every way of writing a date in which all cells can be read, one time of day each. Where there is none, a few cells that are no

@@ -73,10 +73,11 @@ pub(super) fn without_readings(
     format!(
         "{}: {named}; its columns of numbers are \
          {}: say which of them has the readings of which point, in which unit{in_which}, as in --column {example:?}; a UNIT is um, mm, cm, \
-         m, in or ft, or one of these per min, h, day or yr (mm_per_day): what is in another one must be converted first; a column of rain, of a lake or the like is named by --covariate {:?}",
+         m, in or ft, or one of these per min, h, day or yr (mm_per_day): what is in another one must be converted first; a column of rain, of a lake or the like is named by --covariate {:?}{}",
         file.display(),
         numbers.join(", "),
         format!("{first}=level"),
+        coordinates(&numbers).map_or_else(String::new, |columns| by_hand(&columns)),
     )
 }
 
@@ -167,6 +168,36 @@ fn is_covariate(name: &str, meaning: &Meaning, covariates: &[(String, CovariateK
     (of_covariates && !is_levelling) || unit.is_some_and(|unit| Unit::parse(unit).is_err())
 }
 
+/// Names of coordinates, in lower case, by the axis.
+const OF_COORDINATES: [&[&str]; 3] = [
+    &["e", "east", "easting", "x", "ost", "rechtswert"],
+    &["n", "north", "northing", "y", "nord", "hochwert"],
+    &["h", "u", "up", "z", "height", "elevation", "hoehe", "quota"],
+];
+
+/// The columns that are named as the coordinates of a point in two or three axes, with a unit behind the name or without one.
+fn coordinates<'a>(columns: &[&'a str]) -> Option<Vec<&'a str>> {
+    let is_of = |column: &&&str, names: &&[&str]| {
+        let plain = column.to_lowercase();
+        let word = plain.split(|one: char| !one.is_alphanumeric()).next();
+        word.is_some_and(|word| names.contains(&word))
+    };
+    let each = OF_COORDINATES
+        .iter()
+        .filter_map(|names| columns.iter().find(|column| is_of(column, names)));
+    let each: Vec<&str> = each.copied().collect();
+    (each.len() >= 2).then_some(each)
+}
+
+/// How columns that are coordinates are watched.
+fn by_hand(columns: &[&str]) -> String {
+    format!(
+        "; where {} are coordinates of one point, its config is written by hand: [[benchmark]] with components = {columns:?}, unit and direction \
+         (config/example.toml)",
+        columns.join(", ")
+    )
+}
+
 /// The unit that a column's name ends with, after a `_` or a blank or in brackets.
 fn unit_at_end(column: &str) -> Option<Unit> {
     let ends = column
@@ -194,6 +225,16 @@ pub(super) fn other_unit(column: &str, stated: Unit) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn columns_that_are_named_as_coordinates_are_recognised() {
+        assert_eq!(coordinates(&["E", "N", "H"]), Some(vec!["E", "N", "H"]));
+        assert_eq!(
+            coordinates(&["temp", "Easting [m]", "Northing (m)"]),
+            Some(vec!["Easting [m]", "Northing (m)"])
+        );
+        assert_eq!(coordinates(&["crack_1", "x"]), None);
+    }
 
     #[test]
     fn a_unit_in_a_columns_name_that_is_not_the_stated_one_is_said() {

@@ -2,12 +2,14 @@
 
 use super::Args;
 use crate::alert::Policy;
-use crate::cli::replay;
+use crate::cli::{replay, text};
 use crate::config;
 use crate::monitor::{Event, Settings, by_time};
-use crate::reading::{Channel, Recording, Sample, Timestamp};
+use crate::reading::{BenchmarkId, Channel, Recording, Sample, Series, TimeSpan, Timestamp};
 use crate::store::{EARLIEST, LATEST, MOST_SHOWN, Store, Values};
 use anyhow::Context;
+use jiff::tz::TimeZone;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Before the stretch that is reported, its figures show so many times its length.
@@ -22,10 +24,14 @@ pub(super) struct Material {
     pub(super) recording: Recording,
     /// What the monitor said, by the times that it is of.
     pub(super) events: Vec<Event>,
-    /// Events before this are not listed.
+    /// Events before this are not listed, and hours before it not counted.
     pub(super) listed_from: Timestamp,
+    /// Of a state: its newest reading; benchmarks may have fallen silent before. Of files each series ends where it does.
+    pub(super) until: Option<Timestamp>,
     /// By which it judged.
     pub(super) policy: Policy,
+    /// By whose clocks times are shown.
+    pub(super) zone: TimeZone,
     /// Where it comes from, as (what, which).
     pub(super) sources: Vec<(String, String)>,
 }
@@ -38,6 +44,30 @@ impl Material {
             .filter_map(|one| one.readings.last())
             .max_by_key(|one| one.time);
         newest.map_or(Timestamp::UNIX_EPOCH, |one| one.time)
+    }
+
+    /// From the first reading of `series`, or the first event where it has none, to the end of what is known of it.
+    pub(super) fn known(&self, series: &Series) -> TimeSpan {
+        let own = series.span();
+        let to = self.until.or(own.map(|own| own.to)).unwrap_or_default();
+        let first = own.map(|own| own.from);
+        let from = match (self.until, self.events.first()) {
+            // The readings of a state may be drawn from later on.
+            (Some(_), Some(event)) => first.map_or(event.time, |first| first.min(event.time)),
+            (Some(_) | None, _) => first.unwrap_or(to),
+        };
+        TimeSpan::new(from.min(to), to)
+    }
+
+    /// The part of that which is reported.
+    pub(super) fn reported(&self, series: &Series) -> TimeSpan {
+        let known = self.known(series);
+        TimeSpan::new(known.from.max(self.listed_from).min(known.to), known.to)
+    }
+
+    /// A time to the minute, as it is shown.
+    pub(super) fn shown(&self, time: Timestamp) -> String {
+        text::clock(time, &self.zone)
     }
 }
 
@@ -66,7 +96,9 @@ pub(super) fn of_files(args: &Args) -> anyhow::Result<Material> {
         title: title.unwrap_or_else(|| files.join(", ")),
         events,
         listed_from: EARLIEST,
+        until: None,
         policy,
+        zone: TimeZone::UTC,
         sources: vec![
             ("files".to_owned(), files.join(", ")),
             (
@@ -93,18 +125,17 @@ pub(super) fn of_state(args: &Args, file: &Path) -> anyhow::Result<Material> {
     let listed_from = since(1);
     let drawn_from = since(1 + BEFORE);
     let mut recording = Recording::default();
-    for id in store.benchmarks()?.into_keys() {
-        if args
-            .readings
-            .benchmark
-            .as_deref()
-            .is_none_or(|one| one == id.as_str())
-        {
-            let series = store.series(&wanted(id.as_str(), true, drawn_from))?;
-            if !series.readings.is_empty() {
-                recording.series.push(series);
-            }
-        }
+    // Those that have fallen silent, or never read, too.
+    let declared = config.benchmarks.iter().map(|one| one.id.clone());
+    let all: BTreeSet<BenchmarkId> = store.benchmarks()?.into_keys().chain(declared).collect();
+    let is_asked = |id: &BenchmarkId| {
+        let asked = args.readings.benchmark.as_deref();
+        asked.is_none_or(|one| one == id.as_str())
+    };
+    for id in all.iter().filter(|id| is_asked(id)) {
+        recording
+            .series
+            .push(store.series(&wanted(id.as_str(), true, drawn_from))?);
     }
     for (name, unit) in store.channels()? {
         let samples = store.values(&wanted(&name, false, drawn_from))?;
@@ -123,14 +154,16 @@ pub(super) fn of_state(args: &Args, file: &Path) -> anyhow::Result<Material> {
     }
     let span = args.last.map_or_else(
         || "all of its data".to_owned(),
-        |span| format!("from {}", (end - span).strftime("%Y-%m-%d %H:%MZ")),
+        |span| format!("from {}", text::clock(end - span, &config.site.time_zone)),
     );
     Ok(Material {
         title: config.site.name.clone(),
         recording,
         events: events(&store)?,
         listed_from,
+        until: Some(end),
         policy: config.settings.policy.clone(),
+        zone: config.site.time_zone.clone(),
         sources: vec![
             ("state of the daemon".to_owned(), span),
             (

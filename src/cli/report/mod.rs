@@ -24,7 +24,7 @@ pub(super) struct Args {
     /// The site whose daemon's state is reported, instead of files
     #[arg(long, value_name = "CONFIG", conflicts_with_all = ["files", "channels", "failure_time", "no_failure", "quantity", "evacuation_time", "critical_velocity"], conflicts_with_all = FILE_FLAGS)]
     config: Option<PathBuf>,
-    /// Of a state: only this last stretch of its data, such as 7d
+    /// Of a state: only this last stretch of its data, such as 7d; figures show five times as much
     #[arg(long, value_name = "DURATION", requires = "config", value_parser = value::duration)]
     last: Option<SignedDuration>,
     /// When the slope failed: forecasts are scored against it

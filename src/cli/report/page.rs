@@ -44,6 +44,13 @@ pub(super) fn page(args: &Args, material: &Material) -> anyhow::Result<String> {
             escaped(kind)
         );
     }
+    if let Some(zone) = material.zone.iana_name().filter(|name| *name != "UTC") {
+        let _ = writeln!(
+            out,
+            "<p class=\"subject\">Times are those of {}; on the axes of figures they are in UTC.</p>",
+            escaped(zone)
+        );
+    }
     out.push_str("<ul class=\"others\">\n");
     for (index, series) in material.recording.series.iter().enumerate() {
         let _ = writeln!(
@@ -75,7 +82,11 @@ fn benchmark(args: &Args, material: &Material, index: usize) -> anyhow::Result<S
         escaped(&sections::summary(material, series))
     );
     let mut pictures = 0;
-    for svg in sections::figures(args, material, series) {
+    let figures = match series.readings[..] {
+        [] => Vec::new(),
+        _ => sections::figures(args, material, series),
+    };
+    for svg in figures {
         let _ = writeln!(
             out,
             "<figure>\n{}</figure>",
@@ -86,7 +97,10 @@ fn benchmark(args: &Args, material: &Material, index: usize) -> anyhow::Result<S
     out.push_str(&heading(3, "Levels"));
     out.push_str(&wide(&sections::levels(args, material, series)));
     out.push_str(&heading(3, "In order"));
-    out.push_str(&wide(&sections::in_order(material, series)));
+    match sections::in_order(material, series) {
+        Some(table) => out.push_str(&wide(&table)),
+        None => out.push_str("<p>Nothing was said.</p>\n"),
+    }
     if args.config.is_none() && !args.no_search {
         out.push_str(&heading(3, "Closing the loop"));
         let found = sections::closing_the_loop(material, series);

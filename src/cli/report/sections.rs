@@ -3,13 +3,12 @@
 use super::Args;
 use super::material::Material;
 use crate::alert::{Level, chance_in_words};
-use crate::cli::table::{TextTable, time};
+use crate::cli::table::TextTable;
 use crate::cli::{explain, score, text};
 use crate::figures::{self, Replayed};
 use crate::monitor::{Event, EventKind, FailureTime, levels_in};
 use crate::plot::escaped;
-use crate::reading::{Series, TimeSpan, Timestamp, days_since, figure};
-use jiff::tz::TimeZone;
+use crate::reading::{Series, Timestamp, counted, days_since, figure};
 use std::fmt::Write as _;
 
 /// Events that are listed, the newest.
@@ -18,30 +17,35 @@ const HOURS: f64 = 24.0;
 
 /// One sentence that says how the benchmark stands at the end.
 pub(super) fn summary(material: &Material, series: &Series) -> String {
-    let TimeSpan {
-        from: first,
-        to: last,
-    } = span(series);
-    let (levels, unknown) = levels_in(&material.events, Some(&series.benchmark), span(series));
+    let known = material.known(series);
+    let (levels, unknown) = levels_in(&material.events, Some(&series.benchmark), known);
     let level = levels.last().map_or(Level::Green, |stretch| stretch.level);
-    let since = levels.last().map_or(first, |stretch| stretch.from);
+    let since = levels.last().map_or(known.from, |stretch| stretch.from);
     let unknown = unknown.last().filter(|stretch| stretch.is_in_force);
     let standing = match (level, &unknown) {
         // What nothing can be said of is never called green.
-        (Level::Green, Some(stretch)) => format!("unknown since {}", time(Some(stretch.from))),
+        (Level::Green, Some(stretch)) => format!("unknown since {}", material.shown(stretch.from)),
         (level, Some(stretch)) => format!(
             "{level} since {} and unknown since {}",
-            time(Some(since)),
-            time(Some(stretch.from))
+            material.shown(since),
+            material.shown(stretch.from)
         ),
-        (level, None) => format!("{level} since {}", time(Some(since))),
+        (level, None) => format!("{level} since {}", material.shown(since)),
     };
-    let mut out = format!(
-        "{standing}; {} readings, {} to {}",
-        series.readings.len(),
-        time(Some(first)),
-        time(Some(last)),
-    );
+    let reported = material.reported(series);
+    let from = (series.readings).partition_point(|reading| reading.time < reported.from);
+    let mut out = match &series.readings[from..] {
+        [] => format!(
+            "{standing}; no reading since {}",
+            material.shown(reported.from)
+        ),
+        readings @ [first, ..] => format!(
+            "{standing}; {}, {} to {}",
+            counted(readings.len() as u64, "reading", "readings"),
+            material.shown(first.time),
+            material.shown(readings[readings.len() - 1].time),
+        ),
+    };
     if let Some((velocity, failure)) = newest_forecast(material, series) {
         // Writing to a string cannot fail.
         let _ = match velocity {
@@ -50,7 +54,7 @@ pub(super) fn summary(material: &Material, series: &Series) -> String {
         };
         let (chance, days) = (chance_in_words(failure.probability), failure.horizon_days);
         let none = || format!("after {days:.0} days");
-        let at = |at: Option<Timestamp>| at.map_or_else(none, |at| time(Some(at)));
+        let at = |at: Option<Timestamp>| at.map_or_else(none, |at| material.shown(at));
         let _ = if failure.low.is_none() {
             write!(
                 out,
@@ -85,10 +89,6 @@ fn newest_forecast(material: &Material, series: &Series) -> Option<(Option<f64>,
     })
 }
 
-fn span(series: &Series) -> TimeSpan {
-    series.span().unwrap_or_default()
-}
-
 /// The figures of the replay.
 pub(super) fn figures(args: &Args, material: &Material, series: &Series) -> Vec<String> {
     let replayed = Replayed {
@@ -103,8 +103,8 @@ pub(super) fn figures(args: &Args, material: &Material, series: &Series) -> Vec<
     ]
 }
 
-/// What was said of a benchmark but its forecasts, oldest first.
-pub(super) fn in_order(material: &Material, series: &Series) -> TextTable {
+/// What was said of a benchmark but its forecasts, oldest first; of a run of drifts of one kind the first and the last; `None` where nothing was.
+pub(super) fn in_order(material: &Material, series: &Series) -> Option<TextTable> {
     let ours = |event: &&Event| {
         let kind = event.kind.name();
         event.benchmark.as_ref() == Some(&series.benchmark)
@@ -114,45 +114,67 @@ pub(super) fn in_order(material: &Material, series: &Series) -> TextTable {
     };
     let said: Vec<&Event> = material.events.iter().filter(ours).collect();
     let mut table = TextTable::headed(["time", "kind", "what"]);
-    for event in &said[said.len().saturating_sub(LISTED)..] {
-        let line = text::line(event, &TimeZone::UTC);
+    let said = &said[said.len().saturating_sub(LISTED)..];
+    for (at, event) in said.iter().enumerate() {
+        let is_alike = |other: Option<&&Event>| other.is_some_and(|other| is_drift(event, other));
+        if is_alike(at.checked_sub(1).and_then(|before| said.get(before)))
+            && is_alike(said.get(at + 1))
+        {
+            continue;
+        }
+        let line = text::line(event, &material.zone);
         // Time and place stand before it, two blanks apart.
         let what = line.splitn(3, "  ").nth(2).unwrap_or(&line);
         table.row([
-            time(Some(event.time)),
+            material.shown(event.time),
             event.kind.name().to_owned(),
             what.to_owned(),
         ]);
     }
-    table
+    (!said.is_empty()).then_some(table)
+}
+
+/// Whether both say that the same time has come nearer or gone further away.
+fn is_drift(one: &Event, other: &Event) -> bool {
+    let both = |is: fn(&EventKind) -> bool| is(&one.kind) && is(&other.kind);
+    both(|kind| matches!(kind, EventKind::InterceptDrift { .. }))
+        || both(|kind| matches!(kind, EventKind::TransitionDrift { .. }))
 }
 
 /// When each level was first in force, for how long, and how long before the failure.
 pub(super) fn levels(args: &Args, material: &Material, series: &Series) -> TextTable {
-    let (levels, unknown) = levels_in(&material.events, Some(&series.benchmark), span(series));
-    let mut table = TextTable::headed([
-        "level",
-        "first",
-        "hours in force",
-        "days before the failure",
-    ]);
+    let span = material.reported(series);
+    let (levels, unknown) = levels_in(&material.events, Some(&series.benchmark), span);
+    let mut heads = vec!["level", "first", "hours in force"];
+    if args.failure_time.is_some() {
+        heads.push("days before the failure");
+    }
+    let mut table = TextTable::headed(heads);
     for level in [Level::Yellow, Level::Orange, Level::Red, Level::Unknown] {
         let stretches = levels.iter().chain(&unknown);
         let own: Vec<_> = stretches.filter(|one| one.level == level).collect();
-        let lengths = own.iter().map(|one| HOURS * days_since(one.from, one.to));
-        let hours = lengths.fold(0.0, |sum, one| sum + one);
+        // Stretches that were over before what is reported have no hour in it.
+        let own = own
+            .iter()
+            .filter(|one| one.to > span.from || one.is_in_force);
+        let own: Vec<_> = own.collect();
+        let lengths = own
+            .iter()
+            .map(|one| HOURS * days_since(one.from.max(span.from), one.to));
+        let hours = lengths.fold(0.0, |sum, one| sum + one.max(0.0));
         let first = own.first().map(|one| one.from);
-        let before = args.failure_time.zip(first);
-        let before = before.map_or_else(
-            || "-".to_owned(),
-            |(failure, first)| format!("{:.1}", days_since(first, failure)),
-        );
-        table.row([
+        let mut row = vec![
             level.to_string(),
-            first.map_or_else(|| "never".to_owned(), |first| time(Some(first))),
+            first.map_or_else(|| "never".to_owned(), |first| material.shown(first)),
             format!("{hours:.0}"),
-            before,
-        ]);
+        ];
+        if let Some(failure) = args.failure_time {
+            row.push(first.map_or_else(
+                || "-".to_owned(),
+                |first| format!("{:.1}", days_since(first, failure)),
+            ));
+        }
+        table.row(row);
     }
     table
 }

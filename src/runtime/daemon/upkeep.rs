@@ -17,20 +17,24 @@ impl Daemon {
         }
     }
 
-    /// Keeps how much could not be used, for those who ask the state; on a full disk the next time does.
-    pub(super) fn note_quarantined(&mut self) -> Result<(), StoreError> {
+    /// Keeps how much of the sources could not be used, for those who ask the state, and which brokers hold a session; on a full disk the next
+    /// time does.
+    pub(super) fn note_sources(&mut self) -> Result<(), StoreError> {
+        let noted = self.note_quarantined();
+        let noted = noted.and_then(|()| self.sources.note_sessions(&self.store));
+        match noted {
+            Err(error) if !error.is_full() => Err(error),
+            Ok(()) | Err(_) => Ok(()),
+        }
+    }
+
+    fn note_quarantined(&mut self) -> Result<(), StoreError> {
         let counts = self.reporting.vitals.health().quarantined;
-        if counts == self.quarantined {
-            return Ok(());
+        if counts != self.quarantined {
+            self.store.note_quarantined(&counts)?;
+            self.quarantined = counts;
         }
-        match self.store.note_quarantined(&counts) {
-            Ok(()) => {
-                self.quarantined = counts;
-                Ok(())
-            }
-            Err(error) if error.is_full() => Ok(()),
-            Err(error) => Err(error),
-        }
+        Ok(())
     }
 
     /// Keeps what lasts and keeps it from its work, for those who ask the state.

@@ -67,7 +67,10 @@ enum Link {
 
 /// What came from the broker.
 pub(super) enum SessionEvent<M = BrokerMessage> {
-    Connected,
+    Connected {
+        /// Whether the broker has kept the session, and with it what came in the meantime.
+        is_kept: bool,
+    },
     Message(M),
     Subscribed,
     SubscriptionRefused,
@@ -101,6 +104,14 @@ impl BrokerMessage {
         match &self.of {
             Published::Five(_, publish) => &publish.payload,
             Published::Three(_, publish) => &publish.payload,
+        }
+    }
+
+    /// Whether it is a copy that the broker keeps for whoever subscribes: it may have been taken before.
+    pub(super) fn is_retained(&self) -> bool {
+        match &self.of {
+            Published::Five(_, publish) => publish.retain,
+            Published::Three(_, publish) => publish.retain,
         }
     }
 
@@ -193,9 +204,9 @@ impl Session {
                 came_after: self.ended.load(Ordering::Relaxed),
                 ended: Arc::clone(&self.ended),
             })),
-            Ok(SessionEvent::Connected) => {
+            Ok(SessionEvent::Connected { is_kept }) => {
                 self.is_accepted = true;
-                Ok(SessionEvent::Connected)
+                Ok(SessionEvent::Connected { is_kept })
             }
             Ok(SessionEvent::Subscribed) => Ok(SessionEvent::Subscribed),
             Ok(SessionEvent::SubscriptionRefused) => Ok(SessionEvent::SubscriptionRefused),
@@ -310,7 +321,9 @@ fn three(client: &BrokerClient, to: (String, u16), transport: Transport) -> Link
 
 fn came_by_five(client: &v5::AsyncClient, packet: packet5::Packet) -> SessionEvent<Published> {
     match packet {
-        packet5::Packet::ConnAck(_) => SessionEvent::Connected,
+        packet5::Packet::ConnAck(answer) => SessionEvent::Connected {
+            is_kept: answer.session_present,
+        },
         packet5::Packet::Publish(publish) => {
             SessionEvent::Message(Published::Five(client.clone(), publish))
         }
@@ -339,7 +352,9 @@ fn came_by_five(client: &v5::AsyncClient, packet: packet5::Packet) -> SessionEve
 
 fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> SessionEvent<Published> {
     match packet {
-        v3::Packet::ConnAck(_) => SessionEvent::Connected,
+        v3::Packet::ConnAck(answer) => SessionEvent::Connected {
+            is_kept: answer.session_present,
+        },
         v3::Packet::Publish(publish) => {
             SessionEvent::Message(Published::Three(client.clone(), publish))
         }

@@ -89,20 +89,15 @@ impl Site {
         if self.is_set_aside(arrival, host_time) {
             return Ok(Vec::new());
         }
-        if let Some(store) = &self.sinks.store
-            && !self.is_latest(arrival)
-        {
-            let anew_after = self.read.anew_after(arrival.input.read_benchmark());
-            let known = store.has(&self.batch, &arrival.input, anew_after)?;
-            if known == Presence::Corrected && self.returned.waits(arrival) {
-                self.counts.repeated += 1;
-                return Ok(Vec::new());
-            }
-            self.returned.comes(arrival);
-            if known == Presence::Yes {
-                self.counts.repeated += 1;
-                return Ok(Vec::new());
-            }
+        let known = self.presence(arrival)?;
+        if known == Presence::Corrected && self.returned.waits(arrival) {
+            self.counts.repeated += 1;
+            return Ok(Vec::new());
+        }
+        self.returned.comes(arrival);
+        if known == Presence::Yes {
+            self.counts.repeated += 1;
+            return Ok(Vec::new());
         }
         Ok(self.take_new(arrival, host_time))
     }
@@ -325,7 +320,7 @@ impl Site {
     }
 
     /// Whether nothing as late as this reading of its benchmark has been taken: it cannot be known then.
-    fn is_latest(&self, arrival: &Arrival) -> bool {
+    pub(super) fn is_latest(&self, arrival: &Arrival) -> bool {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return false;
         };

@@ -6,7 +6,9 @@
 use super::Site;
 use crate::monitor::{Event, Measured};
 use crate::reading::{Quantity, Timestamp};
+use crate::runtime::mqtt::ReceivedMessage;
 use crate::runtime::tail::Arrival;
+use crate::store::{Presence, StoreError};
 use std::collections::BTreeMap;
 
 /// So many wait at most; those beyond it count at once.
@@ -47,6 +49,37 @@ impl Returned {
 }
 
 impl Site {
+    /// The values of a message that are to be taken: not those that have been corrected since the broker began to keep it for whoever
+    /// subscribes.
+    ///
+    /// # Errors
+    /// When the state cannot be asked whether a value is known.
+    pub fn not_outdated<'a>(
+        &mut self,
+        message: &'a ReceivedMessage,
+    ) -> Result<Vec<&'a Arrival>, StoreError> {
+        let mut values = Vec::with_capacity(message.arrivals.len());
+        for arrival in &message.arrivals {
+            if message.is_retained && self.presence(arrival)? == Presence::Corrected {
+                self.counts.repeated += 1;
+            } else {
+                values.push(arrival);
+            }
+        }
+        Ok(values)
+    }
+
+    /// Whether a value of a time that is not the latest is known.
+    pub(super) fn presence(&self, arrival: &Arrival) -> Result<Presence, StoreError> {
+        match &self.sinks.store {
+            Some(store) if !self.is_latest(arrival) => {
+                let anew_after = self.read.anew_after(arrival.input.read_benchmark());
+                store.has(&self.batch, &arrival.input, anew_after)
+            }
+            Some(_) | None => Ok(Presence::No),
+        }
+    }
+
     /// Whether it is still to be seen what some values are.
     pub fn is_undecided(&self) -> bool {
         !self.returned.0.is_empty()

@@ -2,7 +2,7 @@
 
 use super::file::{Content, FileTail};
 use super::follow::Follower;
-use super::text::RefusedRows;
+use super::text::MOST_REFUSED;
 use crate::reading::counted;
 use crate::runtime::clock;
 use crate::runtime::service_faults::{FaultPlace, ServiceFaultKind};
@@ -14,8 +14,6 @@ use std::time::Duration;
 
 /// A file that has rested for so long is not within the writing of a row.
 const RESTED: Duration = Duration::from_secs(60);
-/// So many rows in a row that cannot be used are no accident: the table has become another one.
-const MOST_REFUSED: u64 = 5;
 /// What was last written longer ago than this is no row that anybody waits for.
 const OF_INTEREST: SignedDuration = SignedDuration::from_hours(24 * 7);
 
@@ -122,11 +120,13 @@ impl FileTail {
             let text = format!("{file} cannot be read: {trouble}");
             return Some((ServiceFaultKind::FileUnreadable, text));
         }
-        let RefusedRows { count, why, .. } = &self.refused_rows;
-        (*count >= MOST_REFUSED).then(|| {
-            let text = format!("none of the newest {count} rows of {file} could be used: {why}");
-            (ServiceFaultKind::RowsRefused, text)
-        })
+        let (count, why) = self.refused_rows.fault()?;
+        let what = match self.decoder.text_rows(&self.path) {
+            Some(_) => "rows",
+            None => "messages",
+        };
+        let text = format!("none of the newest {count} {what} of {file} could be used: {why}");
+        Some((ServiceFaultKind::RowsRefused, text))
     }
 }
 
@@ -269,6 +269,51 @@ mod tests {
         assert_eq!(place.kind, ServiceFaultKind::RowsRefused);
         assert!(text.contains("none of the newest 5 rows"), "{text}");
         assert!(faults("2026-01-01T01:00:00Z,1.1\n").is_empty());
+    }
+
+    #[test]
+    fn messages_of_a_recording_of_which_none_can_be_used_any_more_are_a_fault() {
+        let folder = tempfile::tempdir().unwrap();
+        let site = "[site]\nname = \"s\"\nstate_dir = \"state\"\n[[source]]\nid = \"robot\"\nkind = \"mcap\"\npath = \"*.mcap\"\n";
+        fs::write(folder.path().join("site.toml"), site).unwrap();
+        let config = crate::config::load(&folder.path().join("site.toml")).unwrap();
+        let mut follower = Follower::new(&config.sources, &[], &[]);
+        let file = fs::File::create(folder.path().join("a.mcap")).unwrap();
+        let options = mcap::WriteOptions::new().use_chunks(false);
+        let mut writer = mcap::Writer::with_options(file, options).unwrap();
+        let channel = writer.add_channel(0, "/benchmarks/5/displacement", "json", &BTreeMap::new());
+        let channel_id = channel.unwrap();
+        let mut sequence = 0;
+        let mut faults = |json: &str| {
+            sequence += 1;
+            let time = 1_780_000_000_000_000_000 + 3_600_000_000_000 * u64::from(sequence);
+            let header = mcap::records::MessageHeader {
+                channel_id,
+                sequence,
+                log_time: time,
+                publish_time: time,
+            };
+            let written = writer.write_to_known_channel(&header, json.as_bytes());
+            written.and_then(|()| writer.flush()).unwrap();
+            for _ in 0..4 {
+                follower.poll(clock::now());
+            }
+            follower.faults()
+        };
+        assert!(faults(r#"{"value": 1.0, "unit": "mm"}"#).is_empty());
+        for _ in 0..4 {
+            assert!(faults(r#"{"value": 1.0, "unit": "furlong"}"#).is_empty());
+        }
+        let lasting = faults(r#"{"value": 1.0, "unit": "furlong"}"#);
+        let [(place, text)] = &lasting[..] else {
+            panic!("{lasting:?}");
+        };
+        assert_eq!(place.kind, ServiceFaultKind::RowsRefused);
+        assert!(
+            text.contains("newest 5 messages") && text.contains("furlong"),
+            "{text}"
+        );
+        assert!(faults(r#"{"value": 1.1, "unit": "mm"}"#).is_empty());
     }
 
     #[test]

@@ -75,6 +75,7 @@ impl FileTail {
 
     fn quarantine_record(&mut self, error: &RecordFault) {
         self.quarantined += 1;
+        self.refused_rows.add(error);
         let (file, offset, total) = (self.path.display(), self.at, self.quarantined);
         if is_logged(total) {
             tracing::warn!(%file, offset, %error, total, "record quarantined");
@@ -83,8 +84,13 @@ impl FileTail {
 
     fn take_message(&mut self, message: &RawMessage) {
         match decode_message(message.channel(), message.publish_time, &message.payload) {
-            Ok(item) => item.into_iter().for_each(|item| self.expect(item)),
+            Ok(Some(item)) => {
+                self.refused_rows.end();
+                self.expect(item);
+            }
+            Ok(None) => {}
             Err(error) => {
+                self.refused_rows.add(&error);
                 self.quarantined += 1;
                 let (file, total) = (self.path.display(), self.quarantined);
                 if is_logged(total) {

@@ -33,30 +33,48 @@ pub(in crate::runtime) struct LinesRead {
     pub(in crate::runtime) remarks: Vec<Remark>,
 }
 
-/// The newest lines of a file, where none of them could be used.
+/// The newest lines of a file, or messages of a recording or broker, where none of them could be used.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct RefusedRows {
+pub(in crate::runtime) struct RefusedRows {
     /// Since the last line of which something could be used.
-    pub(super) count: u64,
+    pub(in crate::runtime) count: u64,
     /// What is wrong with the newest.
     pub(super) why: String,
     /// Whether something of a line before them could be used.
-    pub(super) is_below_used: bool,
+    pub(in crate::runtime) is_below_used: bool,
 }
 
+/// So many rows in a row that cannot be used are no accident: the table has become another one.
+pub(super) const MOST_REFUSED: u64 = 5;
+
 impl RefusedRows {
+    /// What is wrong with the newest, and how many there are, where that is no accident.
+    pub(in crate::runtime) fn fault(&self) -> Option<(u64, &str)> {
+        (self.count >= MOST_REFUSED).then_some((self.count, self.why.as_str()))
+    }
+
+    /// Something of the next one can be used.
+    pub(in crate::runtime) fn end(&mut self) {
+        self.count = 0;
+        self.is_below_used = true;
+    }
+
+    /// The next one cannot be used.
+    pub(in crate::runtime) fn add(&mut self, error: &dyn Error) {
+        self.count += 1;
+        self.why = error.to_string();
+    }
+
     /// More lines have been read.
     pub(super) fn note(&mut self, lines: &LinesRead) {
         let used = lines.items.last().map(|(number, _)| *number);
         if used.is_some() {
-            self.count = 0;
-            self.is_below_used = true;
+            self.end();
         }
         // Of a line of which a part can be used the rest is set aside too.
         let since = |line: &&BadLine| used.is_none_or(|used| line.number > used);
         for line in lines.bad.iter().filter(since) {
-            self.count += 1;
-            self.why = line.error.to_string();
+            self.add(&*line.error);
         }
     }
 }
