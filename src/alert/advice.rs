@@ -4,7 +4,7 @@ use super::chance::span_in_words;
 use super::evidence::AlertCause;
 use super::level::Level;
 use super::policy::Policy;
-use super::rules::RED_CHANCE;
+use super::rules::{RED_CHANCE, REPORTED_CHANCE};
 
 impl Level {
     /// What is recommended while it is in force.
@@ -90,6 +90,12 @@ impl Policy {
                     span_in_words(self.outlook)
                 )
             }
+            (REPORTED_CHANCE, _) => format!(
+                "chance of collapse of {} or more within the outlook of {}, of which levels count less because the motion is slow or does not \
+                 surely accelerate",
+                self.orange_chance,
+                span_in_words(self.outlook)
+            ),
             ("velocity-threshold", _) => format!(
                 "velocity of {} mm/day or more",
                 threshold(&|one| one.velocity_mm_per_day)?

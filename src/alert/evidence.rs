@@ -17,6 +17,8 @@ pub struct AlertEvidence {
     pub was_red: bool,
     /// The chance within the outlook.
     pub chance_within_outlook: Option<f64>,
+    /// The chance within the outlook that is reported to people, of which levels may count less.
+    pub reported_within_outlook: Option<f64>,
     /// Latest observed velocity, mm/day; `None` before the second reading.
     pub velocity_mm_per_day: Option<f64>,
     /// The median of the latest few, which neither an outlier nor a reset moves: what a level falls by.

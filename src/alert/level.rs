@@ -12,7 +12,7 @@ use std::fmt;
 pub enum Level {
     /// Nothing to report.
     Green,
-    /// Look closer: the chance of collapse within the outlook is `yellow_chance` or more, the regime turned unstable, a predicted time comes
+    /// Look closer: the chance of collapse within the outlook is `yellow_chance` or more, or that which is reported `orange_chance` or more, the regime turned unstable, a predicted time comes
     /// nearer, or the readings do not follow the law or move upslope.
     Yellow,
     /// Prepare: the chance of collapse within the outlook is `orange_chance` or more, or red is pending: its chance is reached at the newest

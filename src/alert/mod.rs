@@ -20,4 +20,4 @@ pub(crate) use latch::another_since;
 pub use latch::{Entered, Latch, Transition};
 pub use level::Level;
 pub use policy::{Policy, Threshold, to_the_next_reading};
-pub use rules::{Call, is_observed};
+pub use rules::{Call, REPORTED_CHANCE, is_observed};

@@ -8,6 +8,9 @@ use std::borrow::Cow;
 /// The rule by which the chance of a collapse calls red.
 pub(super) const RED_CHANCE: &str = "chance-within-evacuation-time";
 
+/// The rule by which a chance that is reported, and of which levels count little, calls yellow: what people read is never beside green.
+pub const REPORTED_CHANCE: &str = "reported-chance";
+
 /// The level that the evidence calls for, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Call {
@@ -55,6 +58,11 @@ impl Policy {
             Call {
                 level: Level::Yellow,
                 rule: "chance-within-outlook".into(),
+            }
+        } else if reaches(evidence.reported_within_outlook, self.orange_chance) {
+            Call {
+                level: Level::Yellow,
+                rule: REPORTED_CHANCE.into(),
             }
         } else if let Some(cause) = evidence.unusual {
             Call {

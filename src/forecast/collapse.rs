@@ -274,8 +274,8 @@ fn newest(observations: &Observations, days: f64) -> Option<Observations> {
     })
 }
 
-/// The share of the chance within the span of scale `power` that is left to a slope that has slowed: since the span, and
-/// since it was fastest, as far as it is not sure that it accelerates.
+/// The share of the chance within the span of scale `power` that is left to a slope that has slowed, since the span and
+/// since it was fastest, or is slow, as far as it is not sure that it accelerates: brittle slopes run up from rates at which others creep for ever.
 fn goes_on(scales: &Scales, power: usize, accelerating: f64) -> f64 {
     let view = View::at(scales, power);
     let scale = view.scale(0);
@@ -284,7 +284,7 @@ fn goes_on(scales: &Scales, power: usize, accelerating: f64) -> f64 {
     let ever = view.ln_velocity(0) - highest;
     let has_slowed = (since.exp() / SLOWED).min(1.0) * ever.exp().min(1.0).powi(SURVIVED);
     let unsure = (1.0 - accelerating) / (1.0 - accelerating + ALL_BUT_SURE);
-    has_slowed.powf(unsure) * is_fast(scales, power)
+    (has_slowed * is_fast(scales, power)).powf(unsure)
 }
 
 /// The share of the chance within the span of scale `power` that is left to a slope for its velocity, the highest now of that scale and the shorter

@@ -7,7 +7,7 @@ use crate::alert::{Level, another_since};
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Benchmarks that a text names.
 const MOST_NAMED: usize = 5;
@@ -94,18 +94,29 @@ impl SiteAlert {
     }
 
     /// Takes the benchmarks of which nothing can be said, among `all`; says whether that becomes, or ceases to be, true of the
-    /// site: where those that are known cannot make its level, or the unknown ones could by themselves.
+    /// site: where those that are known cannot make its level, or the unknown ones could by themselves, or together with those at
+    /// orange or red could make a higher one.
     fn update_unknown(
         &mut self,
         rule: Option<SiteLevel>,
         now: Timestamp,
-        unknown: &[&BenchmarkId],
-        all: usize,
+        in_force: &LevelsInForce,
+        (unknown, all): (&[&BenchmarkId], usize),
     ) -> Option<Event> {
+        let level = self.in_force.map(|(level, _)| level);
+        let may_reach = |higher: Level, needed: usize| {
+            let mut reach: BTreeSet<&BenchmarkId> = in_force.at_least(higher).into_iter().collect();
+            reach.extend(unknown);
+            Some(higher) > level && reach.len() >= needed
+        };
         let is_unknown = !unknown.is_empty()
             && rule.is_some_and(|rule| {
                 let needed = rule.needed();
-                unknown.len() >= needed || all - unknown.len() < needed
+                unknown.len() >= needed
+                    || all - unknown.len() < needed
+                    || [Level::Orange, Level::Red].into_iter().any(|higher| {
+                        !in_force.at_least(higher).is_empty() && may_reach(higher, needed)
+                    })
             });
         match (self.unknown, is_unknown) {
             (None, true) => {
@@ -154,9 +165,8 @@ impl Monitor {
         let unknown: Vec<&BenchmarkId> = unknown.chain(awaited).collect();
         let counts = (unknown.len(), all);
         let mut of_site = self.site.update(rule, now, in_force, counts);
-        if is_changed || levels().any(|level| level == Level::Unknown) {
-            of_site.extend(self.site.update_unknown(rule, now, &unknown, all));
-        }
+        let said = (self.site).update_unknown(rule, now, in_force, (&unknown, all));
+        of_site.extend(said);
         of_site
     }
 }

@@ -35,6 +35,7 @@ pub mod recorded;
 pub mod reloaded;
 pub mod replay;
 pub mod reporting;
+pub mod restored;
 pub mod run;
 pub mod sampling;
 pub mod sandbox;

@@ -3,6 +3,7 @@
 //! The session is kept under a stable name and acknowledgements are ours to give: what was not
 //! acknowledged when the process or the connection ended comes again.
 
+mod connection;
 mod publish;
 mod refused;
 mod session;
@@ -18,6 +19,7 @@ use super::tail::{Arrival, Decoder};
 use crate::config::{Benchmark, Broker};
 use crate::monitor::Input;
 use crate::reading::Timestamp;
+use connection::Connection;
 use refused::RefusedTopics;
 use session::{BrokerMessage, NoConnection, Session, SessionEvent};
 use std::path::Path;
@@ -138,9 +140,10 @@ pub async fn follow(
     subscription: Subscription,
     mut shutdown: Shutdown,
 ) {
-    use ServiceFaultKind::{BrokerUnreachable, MessagesRefused, SubscriptionRefused};
-    let [unreachable, refused, useless] = [BrokerUnreachable, SubscriptionRefused, MessagesRefused]
-        .map(|kind| FaultPlace::of_source(kind, &broker.id));
+    use ServiceFaultKind::{MessagesRefused, SubscriptionRefused};
+    let [refused, useless] =
+        [SubscriptionRefused, MessagesRefused].map(|kind| FaultPlace::of_source(kind, &broker.id));
+    let mut connection = Connection::new(&broker, &subscription.client, &faults);
     let mut session = Session::new(broker.clone(), subscription.client.clone());
     let mut was_granted = subscription.is_known;
     let mut reader = Reader {
@@ -163,7 +166,7 @@ pub async fn follow(
                         let _ = deliveries.send(possible_gap(&broker.id)).await;
                     }
                     wait = RECONNECT.0;
-                    faults.is_over(&unreachable);
+                    connection.begins();
                     // Again each time: a broker that lost its sessions has forgotten it.
                     if let Err(error) = session.subscribe(&broker.topic) {
                         tracing::error!(source = broker.id, %error, "cannot subscribe");
@@ -177,8 +180,8 @@ pub async fn follow(
                         () = shutdown.requested() => return,
                     }
                 }
-                Ok(SessionEvent::Subscribed) => {
-                    faults.is_over(&refused);
+                Ok(SessionEvent::Subscribed { is_kept }) => {
+                    note_granted(&faults, &refused, is_kept);
                     was_granted = true;
                     subscription.begin();
                 }
@@ -196,8 +199,7 @@ pub async fn follow(
                 Ok(SessionEvent::Nothing) => {}
                 Err(error) => {
                     tracing::warn!(source = broker.id, %error, ?wait, "no connection; will connect again");
-                    let (host, port) = (&broker.address.host, broker.address.port);
-                    faults.lasts(unreachable.clone(), &format!("no connection to {host}:{port}: {error}"));
+                    connection.ends(&error.to_string());
                     if !waits(wait, &mut shutdown).await {
                         return;
                     }
@@ -223,7 +225,8 @@ pub(super) async fn try_out(broker: &Broker) -> Result<(), String> {
             Ok(SessionEvent::Connected { .. }) => {
                 (session.subscribe(&broker.topic)).map_err(|error| error.to_string())?;
             }
-            Ok(SessionEvent::Subscribed) => break,
+            Ok(SessionEvent::Subscribed { is_kept: true }) => break,
+            Ok(SessionEvent::Subscribed { is_kept: false }) => return Err(GRANTS_LESS.to_owned()),
             Ok(SessionEvent::SubscriptionRefused) => {
                 return Err(format!("refuses the subscription to {:?}", broker.topic));
             }
@@ -241,6 +244,20 @@ pub(super) async fn try_out(broker: &Broker) -> Result<(), String> {
     // Sends it; how the connection ends does not matter.
     let _ = session.next().await.is_ok();
     Ok(())
+}
+
+/// What a broker does that grants QoS 0 where QoS 1 is asked for.
+const GRANTS_LESS: &str =
+    "grants the subscription at QoS 0 alone: what is sent while there is no connection is lost";
+
+/// The subscription stands, but not always as it was asked for.
+fn note_granted(faults: &ServiceFaults, refused: &FaultPlace, is_kept: bool) {
+    if is_kept {
+        faults.is_over(refused);
+    } else {
+        tracing::warn!(source = refused.source, "the broker {GRANTS_LESS}");
+        faults.lasts(refused.clone(), &format!("the broker {GRANTS_LESS}"));
+    }
 }
 
 /// Waits for so long; whether to go on then.

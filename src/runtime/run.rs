@@ -8,6 +8,7 @@ use super::link;
 use super::progress::Progress;
 use super::record::live::EventWords;
 use super::reporting::{Reporting, ReportingError};
+use super::restored;
 use super::serve::ServedState;
 use super::shutdown::{self, Shutdown};
 use super::site::{Counts, Sinks, Site};
@@ -69,6 +70,7 @@ pub async fn run(
     if let Err(error) = shutdown::survive_the_file_limit() {
         tracing::warn!(%error, "a limit on the length of files would end this process");
     }
+    let is_restored = restored::offer_again(&store).map_err(fail)?;
     link::make_secret_of(config);
     let vitals = Arc::new(Vitals::default());
     show_stored(config, &store, &vitals).map_err(fail)?;
@@ -98,6 +100,10 @@ pub async fn run(
     let mut daemon = Daemon::new(config, store, site, sources, reporting, clock::now);
     daemon.beside = Some(beside);
     daemon.note_inherited(config).map_err(fail)?;
+    if is_restored {
+        let reported = daemon.report("state-restored", restored::TEXT.to_owned());
+        reported.map_err(fail)?;
+    }
     tracing::info!(site = config.site.name, state = %config.site.state_dir.display(), "started");
     let worked = daemon.work(shutdown, hangup, progress).await;
     let Daemon {

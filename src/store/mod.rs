@@ -5,6 +5,7 @@
 //! acknowledged before it, and a restart goes on exactly where the last commit left off.
 
 mod access;
+mod again;
 mod batch;
 mod broker;
 mod checkpoint;
@@ -39,6 +40,9 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+
+/// In the table `meta` of a copy.
+const COPY: &str = "is_copy";
 
 /// The database in the state folder.
 const FILE: &str = "slipwatch.db";
@@ -275,7 +279,31 @@ impl Store {
         self.inner()
             .connection
             .execute("VACUUM INTO ?1", [path.as_ref()])?;
+        let copy = Connection::open(file)?;
+        copy.execute(
+            "INSERT OR REPLACE INTO meta (name, value) VALUES (?1, 1)",
+            [COPY],
+        )?;
+        copy.close().map_err(|(_, error)| error)?;
         File::open(file)?.sync_all()?;
+        Ok(())
+    }
+
+    /// Whether this is a copy by [`Store::backup`] that was put in the place of a state and on which no daemon has worked.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn is_copy(&self) -> Result<bool, StoreError> {
+        Ok(read::meta(&self.inner().connection, COPY)?.is_some())
+    }
+
+    /// A daemon works on it: it is a copy no longer.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn is_at_work(&self) -> Result<(), StoreError> {
+        let delete = "DELETE FROM meta WHERE name = ?1";
+        self.inner().connection.execute(delete, [COPY])?;
         Ok(())
     }
 

@@ -308,43 +308,6 @@ impl Store {
         given.map(timestamp).transpose()
     }
 
-    /// Has what was given up, or closed, wait again, as if it had never been tried, but for alerts that `is_over` by their
-    /// bodies. Says how many deliveries wait again and how many were left out. The daemon takes them at its next start, or
-    /// when it takes its config again.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn redeliver(&self, is_over: &dyn Fn(&[u8]) -> bool) -> Result<(usize, usize), StoreError> {
-        let mut inner = self.inner();
-        let transaction = inner.connection.transaction()?;
-        let (mut again, mut left_out) = (Vec::new(), 0);
-        {
-            let mut query = transaction.prepare(
-                "SELECT id, key, level, state, hook, time, body FROM outbox
-                 WHERE status IN ('dead', 'closed') ORDER BY id",
-            )?;
-            let mut rows = query.query([])?;
-            while let Some(row) = rows.next()? {
-                let id: i64 = row.get(0)?;
-                if body(row)?.is_some_and(|body| is_over(&body)) {
-                    left_out += 1;
-                } else {
-                    again.push(id);
-                }
-            }
-        }
-        let sum = standing_sum(WAITING, 0);
-        for id in &again {
-            transaction
-                .prepare_cached(
-                    "UPDATE outbox SET status = ?2, attempts = 0, sum = ?3 WHERE id = ?1",
-                )?
-                .execute(params![id, WAITING, sum])?;
-        }
-        transaction.commit()?;
-        Ok((again.len(), left_out))
-    }
-
     /// Notes what became of deliveries; with those that were not noted before.
     ///
     /// # Errors
@@ -376,7 +339,7 @@ pub(super) fn stands_as_written(row: &Row<'_>) -> Result<bool, StoreError> {
     Ok(written.is_none_or(|written| written == standing_sum(&status, attempts)))
 }
 
-fn standing_sum(status: &str, attempts: i64) -> i64 {
+pub(super) fn standing_sum(status: &str, attempts: i64) -> i64 {
     sum(&[
         ValueRef::Text(status.as_bytes()),
         ValueRef::Integer(attempts),

@@ -254,20 +254,20 @@ impl Store {
         Ok(orders)
     }
 
-    /// Leaves an order for the daemon, which takes it within a second, or at its next start, with how far the events have got:
-    /// what is called after that, whoever gives it has not seen.
+    /// Leaves an order for the daemon, which takes it within a second, or at its next start, with how far the events have got, or had when
+    /// whoever gives it looked: number `seen`. What is called after that, they have not seen.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn ask(&self, order: &Order) -> Result<(), StoreError> {
+    pub fn ask(&self, order: &Order, seen: Option<i64>) -> Result<(), StoreError> {
         let body = serde_json::to_string(order);
         let body = body.map_err(|error| StoreError::Unreadable(error.to_string()))?;
         let inner = self.inner();
         let connection = &inner.connection;
         let written = connection.execute(
             "INSERT INTO command (body) VALUES
-             (json_insert(?1, '$.last_event', (SELECT coalesce(max(seq), 0) FROM event)))",
-            [body],
+             (json_insert(?1, '$.last_event', min(?2, (SELECT coalesce(max(seq), 0) FROM event))))",
+            params![body, seen.unwrap_or(i64::MAX)],
         );
         let folder = connection.path().map(Path::new).and_then(Path::parent);
         match (written, folder) {
@@ -310,6 +310,18 @@ impl Store {
     /// The number of the last step.
     pub fn last_step(&self) -> i64 {
         self.inner().steps
+    }
+
+    /// The number of the newest event that is written by now.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn newest_event(&self) -> Result<i64, StoreError> {
+        let query = "SELECT coalesce(max(seq), 0) FROM event";
+        Ok(self
+            .inner()
+            .connection
+            .query_row(query, [], |row| row.get(0))?)
     }
 
     /// The number of the last event.

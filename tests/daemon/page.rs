@@ -194,6 +194,28 @@ fn an_order_needs_the_token_a_name_and_a_span_that_is_allowed() {
 }
 
 #[test]
+fn an_order_is_not_of_what_was_called_after_the_view_that_it_is_given_from() {
+    let site = Site::start();
+    let headers = format!("Authorization: Bearer {TOKEN}\r\nContent-Type: application/json\r\n");
+    let view = site.json("/api/benchmark?id=E3");
+    let newest = view["newest_event"].as_i64().unwrap();
+    assert!(newest > 0);
+    let taken = |seen: i64, count: usize| {
+        let order_of_view =
+            json!({ "order": "acknowledge", "benchmark": "E3", "by": "Anna", "seen": seen });
+        assert_eq!(order(&site, &headers, &order_of_view).0, 200);
+        let start = slipwatch::runtime::clock::Stopwatch::start();
+        while site.events("order").len() < count && start.elapsed().as_secs() < 60 {
+            std::thread::sleep(std::time::Duration::from_millis(100));
+        }
+        let acknowledged = site.json("/api/site")["acknowledged_by"].clone();
+        acknowledged.as_object().unwrap().len()
+    };
+    assert_eq!(taken(0, 1), 0, "called since, and not seen");
+    assert_eq!(taken(newest, 2), 1);
+}
+
+#[test]
 fn the_silence_of_the_whole_site_is_not_ended_for_one_benchmark_without_a_word() {
     let site = Site::start();
     let headers = format!("Authorization: Bearer {TOKEN}\r\nContent-Type: application/json\r\n");

@@ -297,3 +297,56 @@ fn a_state_on_a_read_only_file_system_is_said_to_be_there() {
         );
     }
 }
+
+/// A copy that was made while a red was in force, and the red ended after it.
+#[test]
+fn a_backup_that_is_put_back_sends_again_what_was_in_force_and_the_next_red_is_notified() {
+    let site = Site::new(
+        "[[benchmark]]\nid = \"5\"\nsource = \"logger\"\n[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"100 mm\"\n",
+    );
+    let now = slipwatch::runtime::clock::now();
+    let row = |minute: i64, value: f64| {
+        format!(
+            "{},{value}\n",
+            now - jiff::SignedDuration::from_mins(60 - minute)
+        )
+    };
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm\n{}{}", row(0, 0.0), row(10, 0.1)),
+    );
+    let program = site.caught_up();
+    site.append("incoming/5.csv", &row(20, 130.0));
+    site.awaits_red();
+    site.printed(&["backup", "copy.db", "--config", "site.toml"]);
+    let resolve = [
+        "alerts",
+        "resolve",
+        "--benchmark",
+        "5",
+        "--by",
+        "Ada",
+        "--why",
+        "a test",
+    ];
+    site.printed(&[&resolve[..], &["--config", "site.toml"]].concat());
+    eventually("its end", || site.notified("5/red/", "resolved") == 1);
+    program.stop();
+    for name in ["slipwatch.db-wal", "slipwatch.db-shm"] {
+        // Not there after an orderly stop.
+        let _ = fs::remove_file(site.path("state").join(name));
+    }
+    fs::copy(site.path("copy.db"), site.path("state/slipwatch.db")).unwrap();
+    let program = site.caught_up();
+    eventually("the red again", || site.notified("5/red/", "firing") == 2);
+    program.stop();
+    let events = site.events();
+    assert_eq!(
+        events.matches("\"kind\":\"state-restored\"").count(),
+        1,
+        "{events}"
+    );
+    let program = site.caught_up();
+    program.stop();
+    assert_eq!(site.notified("5/red/", "firing"), 2, "once");
+}

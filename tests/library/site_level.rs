@@ -162,3 +162,34 @@ fn benchmarks_that_have_never_read_cannot_be_judged_and_those_that_do_make_the_s
     assert!(!red_with(&["a", "b"]), "b can be judged and is not red");
     assert!(red_with(&["a"]), "nothing can be said of b and c");
 }
+
+#[test]
+fn a_site_that_one_unknown_benchmark_could_make_red_beside_a_red_one_is_unknown() {
+    let unknown_with = |first: f64| {
+        let mut monitor = begin(Some(SiteLevel::AtLeast(2)));
+        for hour in 1..100 {
+            for id in ["a", "b", "c"] {
+                if id != "c" || hour < 30 {
+                    read(&mut monitor, id, hour, 0.0);
+                }
+            }
+            let said = of_the_site(&monitor.step(start() + hour.hours(), &Input::Tick));
+            assert!(said.is_empty(), "one of three is silent: {said:?}");
+        }
+        let said = of_the_site(&read(&mut monitor, "a", 100, first));
+        let is_said = |state: AlertState, said: &[(Level, AlertState, String)]| {
+            said.iter()
+                .any(|(level, one, _)| (*level, *one) == (Level::Unknown, state))
+        };
+        let is_unknown = is_said(AlertState::Firing, &said);
+        // The other one is red too: nothing is unknown of the site any more.
+        let said = of_the_site(&read(&mut monitor, "b", 100, 30.0));
+        assert_eq!(
+            is_said(AlertState::Resolved, &said),
+            is_unknown && first >= 20.0
+        );
+        is_unknown
+    };
+    assert!(unknown_with(30.0));
+    assert!(!unknown_with(1.0));
+}

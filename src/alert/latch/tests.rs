@@ -115,6 +115,27 @@ fn a_pause_does_not_end_red_while_the_chance_within_the_outlook_calls_orange() {
 }
 
 #[test]
+fn a_chance_that_is_reported_and_hardly_counts_is_yellow_and_never_green() {
+    let (policy, mut latch) = (Policy::default(), Latch::default());
+    let reported = |hours: i64, chance: f64| AlertEvidence {
+        reported_within_outlook: Some(chance),
+        ..evidence(hours, 0.01, 0.1)
+    };
+    assert!(latch.update(&policy, &reported(0, 0.69)).is_empty());
+    let called = latch.update(&policy, &reported(1, 0.7));
+    assert_eq!(
+        (called[0].level, &*called[0].rule),
+        (Level::Yellow, "reported-chance")
+    );
+    // What counts goes before it.
+    let both = AlertEvidence {
+        chance_within_outlook: Some(0.4),
+        ..reported(2, 0.9)
+    };
+    assert_eq!(policy.call(&both).rule, "chance-within-outlook");
+}
+
+#[test]
 fn one_slow_reading_or_a_backward_one_lowers_nothing() {
     let (policy, mut latch) = red_at_hundred();
     for hour in 1..24 * 6 {

@@ -11,11 +11,11 @@ use super::state::{SiteArgs, is_known, no_benchmark};
 use super::text;
 use crate::alert::Level;
 use crate::config::{EXERCISE, value};
-use crate::monitor::{EventKind, Given, Order, OrderedBy, from_bytes};
+use crate::monitor::{Given, Order, OrderedBy};
 use crate::reading::BenchmarkId;
 use crate::runtime::alarm_state::Alarms;
 use crate::runtime::clock;
-use crate::runtime::hook::{Alert, MessageState};
+use crate::runtime::restored::{is_over, keys_in_force};
 use crate::runtime::standing::{TakenOrders, closed, in_force, silence_of_the_site};
 use crate::store::Store;
 use anyhow::Context;
@@ -23,7 +23,6 @@ use clap::Subcommand;
 use jiff::SignedDuration;
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::collections::BTreeSet;
 use std::io::Write;
 
 /// List the alerts in force, acknowledge or end them, or have no hook run for a time
@@ -173,7 +172,7 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
     if !is_of_a_drill && config.drill.is_none() {
         needs_an_alert(&store, &order).map_err(|error| unwritten::explained(&config, error))?;
     }
-    let asked = store.ask(&order);
+    let asked = store.ask(&order, None);
     asked.map_err(|error| unwritten::explained(&config, error.into()))?;
     let is_running = Store::is_held(&config.site.state_dir);
     site.output.print(&order, |_| taken(&order, is_running))
@@ -324,30 +323,9 @@ pub(super) struct Redelivered {
     left_out: usize,
 }
 
-/// Whether this is the beginning of an alert that is not in force any more, by the keys of those that are.
-fn is_over(body: &[u8], in_force: &BTreeSet<String>) -> bool {
-    let Ok(alert) = from_bytes::<Alert>(body) else {
-        return false;
-    };
-    let stands = match &alert.many {
-        Some(many) => (many.members.iter()).any(|one| in_force.contains(&one.key)),
-        // One of an older version does not say what it reports.
-        None => alert.is_flood() || in_force.contains(&alert.key),
-    };
-    alert.state == MessageState::Firing && !stands
-}
-
 fn redeliver(site: &SiteArgs) -> anyhow::Result<()> {
     let (_, store) = site.open()?;
-    let in_force = in_force(&store, None)?;
-    let keys = (in_force.values()).filter_map(|event| {
-        if let EventKind::Alert { key, .. } = &event.kind {
-            Some(key.clone())
-        } else {
-            None
-        }
-    });
-    let keys: BTreeSet<String> = keys.collect();
+    let keys = keys_in_force(&store)?;
     let (deliveries, left_out) = store.redeliver(&|body| is_over(body, &keys))?;
     let again = Redelivered {
         deliveries,

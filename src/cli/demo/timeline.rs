@@ -288,6 +288,7 @@ fn words(rule: &str) -> String {
         "critical-velocity" => "faster than the critical 1 m/day",
         "decelerated" => "it has slowed down",
         "steady" | "quiet" => "steady for long enough",
+        "reported-chance" => "a collapse is likely, though little shows yet",
         "regime-flip" => "an unstable acceleration has begun",
         "intercept-drifting-in" => "the forecast date moves nearer",
         "transition-drifting-in" => "the inflection of the velocity moves nearer",

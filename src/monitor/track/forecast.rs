@@ -124,6 +124,10 @@ impl LookAhead {
         AlertEvidence {
             chance_for_red: within(self.red),
             chance_within_outlook: within(self.orange),
+            reported_within_outlook: forecast.map(|forecast| {
+                let days = days_of(self.orange);
+                forecast.in_force(days).expected.chance_within(days)
+            }),
             chances: chances.collect(),
             ..observed
         }

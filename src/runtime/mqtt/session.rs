@@ -72,7 +72,10 @@ pub(super) enum SessionEvent<M = BrokerMessage> {
         is_kept: bool,
     },
     Message(M),
-    Subscribed,
+    Subscribed {
+        /// Whether the broker keeps messages until they are acknowledged: it may grant less than is asked for.
+        is_kept: bool,
+    },
     SubscriptionRefused,
     Nothing,
 }
@@ -208,7 +211,7 @@ impl Session {
                 self.is_accepted = true;
                 Ok(SessionEvent::Connected { is_kept })
             }
-            Ok(SessionEvent::Subscribed) => Ok(SessionEvent::Subscribed),
+            Ok(SessionEvent::Subscribed { is_kept }) => Ok(SessionEvent::Subscribed { is_kept }),
             Ok(SessionEvent::SubscriptionRefused) => Ok(SessionEvent::SubscriptionRefused),
             Ok(SessionEvent::Nothing) => Ok(SessionEvent::Nothing),
             Err((may_be_another_version, error)) => {
@@ -330,7 +333,15 @@ fn came_by_five(client: &v5::AsyncClient, packet: packet5::Packet) -> SessionEve
         packet5::Packet::SubAck(answer) => {
             let is_granted = |code| matches!(code, &packet5::SubscribeReasonCode::Success(_));
             if answer.return_codes.iter().all(is_granted) {
-                SessionEvent::Subscribed
+                let is_less = |code| {
+                    matches!(
+                        code,
+                        &packet5::SubscribeReasonCode::Success(QoS5::AtMostOnce)
+                    )
+                };
+                SessionEvent::Subscribed {
+                    is_kept: !answer.return_codes.iter().any(is_less),
+                }
             } else {
                 SessionEvent::SubscriptionRefused
             }
@@ -363,7 +374,11 @@ fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> SessionEvent<P
         {
             SessionEvent::SubscriptionRefused
         }
-        v3::Packet::SubAck(_) => SessionEvent::Subscribed,
+        v3::Packet::SubAck(answer) => SessionEvent::Subscribed {
+            is_kept: !answer
+                .return_codes
+                .contains(&SubscribeReasonCode::Success(QoS::AtMostOnce)),
+        },
         v3::Packet::Connect(_)
         | v3::Packet::PubAck(_)
         | v3::Packet::PubRec(_)

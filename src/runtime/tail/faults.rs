@@ -271,13 +271,45 @@ mod tests {
         assert!(faults("2026-01-01T01:00:00Z,1.1\n").is_empty());
     }
 
+    /// A follower of `*.mcap` in a folder.
+    fn follower_of_recordings(folder: &Path) -> Follower {
+        let site = "[site]\nname = \"s\"\nstate_dir = \"state\"\n[[source]]\nid = \"robot\"\nkind = \"mcap\"\npath = \"*.mcap\"\n";
+        fs::write(folder.join("site.toml"), site).unwrap();
+        let config = crate::config::load(&folder.join("site.toml")).unwrap();
+        Follower::new(&config.sources, &[], &[])
+    }
+
+    #[test]
+    fn what_is_written_behind_the_footer_of_a_recording_is_a_fault() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut follower = follower_of_recordings(folder.path());
+        let mut recording = std::io::Cursor::new(Vec::new());
+        mcap::Writer::new(&mut recording).unwrap().finish().unwrap();
+        let recording = recording.into_inner();
+        let file = folder.path().join("a.mcap");
+        let mut faults = || {
+            for _ in 0..9 {
+                follower.poll(clock::now());
+            }
+            follower.faults()
+        };
+        fs::write(&file, &recording).unwrap();
+        assert!(faults().is_empty());
+        let mut grown = fs::OpenOptions::new().append(true).open(&file).unwrap();
+        grown.write_all(&recording).unwrap();
+        let lasting = faults();
+        let [(place, text)] = &lasting[..] else {
+            panic!("{lasting:?}");
+        };
+        assert_eq!(place.kind, ServiceFaultKind::FileRefused);
+        let count = format!("{} bytes stand behind the footer", recording.len());
+        assert!(text.contains(&count), "{text}");
+    }
+
     #[test]
     fn messages_of_a_recording_of_which_none_can_be_used_any_more_are_a_fault() {
         let folder = tempfile::tempdir().unwrap();
-        let site = "[site]\nname = \"s\"\nstate_dir = \"state\"\n[[source]]\nid = \"robot\"\nkind = \"mcap\"\npath = \"*.mcap\"\n";
-        fs::write(folder.path().join("site.toml"), site).unwrap();
-        let config = crate::config::load(&folder.path().join("site.toml")).unwrap();
-        let mut follower = Follower::new(&config.sources, &[], &[]);
+        let mut follower = follower_of_recordings(folder.path());
         let file = fs::File::create(folder.path().join("a.mcap")).unwrap();
         let options = mcap::WriteOptions::new().use_chunks(false);
         let mut writer = mcap::Writer::with_options(file, options).unwrap();

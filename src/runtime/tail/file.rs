@@ -306,7 +306,8 @@ impl FileTail {
             Content::Text(_) => self.read_text(&file)?,
             Content::Packed(_) => return self.read_packed(stat),
             Content::Mcap { .. } => self.read_record(&file, stat.size)?,
-            Content::Refused(_) | Content::Complete => {}
+            Content::Complete => self.look_behind_footer(&file, stat.size)?,
+            Content::Refused(_) => {}
         }
         let moved = self.at != before;
         if moved {

@@ -30,11 +30,31 @@ impl FileTail {
             NextRecord::End => {
                 tracing::info!(file = %self.path.display(), "recording complete");
                 self.content = Content::Complete;
+                self.look_behind_footer(file, size)?;
             }
             NextRecord::Damaged { length } => {
                 let error = io::Error::other(format!("a record of {length} bytes at {}", self.at));
                 self.refuse(&error);
             }
+        }
+        Ok(())
+    }
+
+    /// Refuses a recording of which all has been read where something stands behind its footer: nobody reads that.
+    pub(super) fn look_behind_footer(&mut self, file: &File, size: u64) -> io::Result<()> {
+        let body_at = self.at + HEADER_BYTES as u64;
+        if self.decoder.text_rows(&self.origin).is_some() || size < body_at {
+            return Ok(());
+        }
+        let mut header = [0; HEADER_BYTES];
+        file.read_exact_at(&mut header, self.at)?;
+        let length = records::footer(header);
+        let end = length.map(|length| body_at + length + MAGIC.len() as u64);
+        if let Some(end) = end.filter(|end| size > *end) {
+            let behind = size - end;
+            self.refuse(&io::Error::other(format!(
+                "{behind} bytes stand behind the footer, with which a recording ends: write each recording into a file of its own"
+            )));
         }
         Ok(())
     }

@@ -72,6 +72,12 @@ pub fn frame(header: [u8; HEADER_BYTES], available: u64) -> NextRecord {
     }
 }
 
+/// The length of a footer, whose header this is.
+pub(super) fn footer(header: [u8; HEADER_BYTES]) -> Option<u64> {
+    let [opcode, length @ ..] = header;
+    (opcode == op::FOOTER).then_some(u64::from_le_bytes(length))
+}
+
 /// A message with what its channel says of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RawMessage {

@@ -111,6 +111,8 @@ pub struct BenchmarkView {
     pub version: &'static str,
     /// The zone that people there live in.
     pub time_zone: String,
+    /// The number of the newest event that is in it.
+    pub newest_event: i64,
     /// Whether orders are taken from here.
     pub takes_orders: bool,
     /// How it stands.
@@ -178,6 +180,7 @@ impl SiteReader {
             return Ok(None);
         }
         let now = self.now()?;
+        let newest_event = self.store.newest_event()?;
         let (at, moment) = (window.at.map(held), window.at.map_or(now, held));
         let known = at.unwrap_or(LATEST);
         let shown_span = TimeSpan {
@@ -206,6 +209,7 @@ impl SiteReader {
             site: self.facts().name.clone(),
             version: env!("CARGO_PKG_VERSION"),
             time_zone: self.facts().time_zone.clone(),
+            newest_event,
             takes_orders: self.facts().takes_orders,
             acknowledged: orders.acknowledged(&levels_now),
             silences: orders.silences(moment),

@@ -30,6 +30,10 @@ pub struct Asked {
     pub why: Option<String>,
     /// For how long, of a shelve or a silence.
     pub seconds: Option<i64>,
+    /// `newest_event` of the view that whoever asks looked at: the order is not of what was called later. Without it, of nothing that is called
+    /// after it.
+    #[serde(default)]
+    pub seen: Option<i64>,
 }
 
 /// Why an order is not taken.
@@ -77,7 +81,7 @@ impl SiteReader {
             ));
         }
         tracing::warn!(?order, "an order came over the network");
-        self.store.ask(&order)?;
+        self.store.ask(&order, asked.seen)?;
         Ok(order)
     }
 

@@ -79,6 +79,8 @@ pub struct SiteView {
     /// What is to be said of the positions, where they are not surveyed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub positions_are: Option<&'static str>,
+    /// The number of the newest event that is in it.
+    pub newest_event: i64,
     /// Whether orders are taken from here.
     pub takes_orders: bool,
     /// The whole site's level.
@@ -109,6 +111,8 @@ impl SiteReader {
     /// [`StoreError`].
     pub fn site(&self, at: Option<Timestamp>) -> Result<SiteView, StoreError> {
         let now = self.now()?;
+        // Before all else is read: what comes meanwhile may be in it, and is not said to be.
+        let newest_event = self.store.newest_event()?;
         let (at, moment) = (at.map(held), at.map_or(now, held));
         let levels = in_force(&self.store, at)?;
         let orders = TakenOrders::read(&self.store, at)?;
@@ -156,6 +160,7 @@ impl SiteReader {
             last: span.map(|span| span.to),
             collapse: self.collapse(at, now),
             positions_are: self.facts().positions_are,
+            newest_event,
             takes_orders: self.facts().takes_orders,
             level,
             is_not_written: unwritten.is_some(),

@@ -2,8 +2,8 @@
 
 use super::{Alarm, BesideForecast};
 use crate::alert::{
-    AlertCause, AlertEvidence, Entered, Level, Policy, RedCourse, Transition, percent_in_words,
-    span_in_words,
+    AlertCause, AlertEvidence, Entered, Level, Policy, REPORTED_CHANCE, RedCourse, Transition,
+    percent_in_words, span_in_words,
 };
 use crate::forecast::HORIZON_DAYS;
 use crate::monitor::event::{AlertState, CalledLevel, Event, EventKind, LevelChance};
@@ -220,6 +220,16 @@ fn text(
             format!("; chance of collapse {chance} within {span} ({name})")
         })
     };
+    let of_levels = match change.rule.as_ref() {
+        REPORTED_CHANCE => (evidence.chance_within_outlook).map_or_else(String::new, |counted| {
+            format!(", of which levels count {}", percent_in_words(counted))
+        }),
+        _ => String::new(),
+    };
+    let within_outlook = match change.rule.as_ref() {
+        REPORTED_CHANCE => evidence.reported_within_outlook,
+        _ => evidence.chance_within_outlook,
+    };
     let is_pending = change.level == Level::Orange && evidence.red == RedCourse::IsNear;
     let pending = if is_pending && change.entered == Entered::Yes {
         policy.pending_red_in_words()
@@ -237,11 +247,11 @@ fn text(
         policy.red_within_in_words()
     );
     format!(
-        "benchmark {}: {}{verb}{grounds}{}{pending}{}{velocity}; critical velocity {} mm/day; rule {}",
+        "benchmark {}: {}{verb}{grounds}{}{pending}{}{of_levels}{velocity}; critical velocity {} mm/day; rule {}",
         record.benchmark(),
         change.level,
         chance(evidence.chance_for_red, ahead.red, &of_red),
-        chance(evidence.chance_within_outlook, ahead.orange, &of_outlook),
+        chance(within_outlook, ahead.orange, &of_outlook),
         shortest(policy.critical_velocity_mm_per_day),
         change.rule,
     )

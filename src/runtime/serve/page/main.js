@@ -8,7 +8,7 @@ import { el, instant, keepMoment, minute, useZone } from '/page/words.js';
 const SOON_MS = 300;
 const SELDOM_MS = 30000;
 const byId = (id) => document.getElementById(id);
-const state = { at: null, route: null, page: null, span: null, isLost: false, since: null, asked: null, cost: 0 };
+const state = { at: null, route: null, page: null, span: null, isLost: false, since: null, asked: null, cost: 0, seen: null };
 
 /** #/?at=T or #/b/ID?at=T */
 function readAddress() {
@@ -82,7 +82,8 @@ function focused() {
 }
 
 /** What stands around every view: the name, the moment, the slider. */
-function frame({ site, time_zone: zone, now, first, last, version }) {
+function frame({ site, time_zone: zone, now, first, last, version, newest_event: seen }) {
+  state.seen = seen;
   if (site) {
     byId('name').textContent = site;
     document.title = `${state.page.name === null ? '' : `${state.page.name}, `}${site}`;
@@ -169,6 +170,8 @@ function orders(kind, benchmark) {
   byId('why').value = '';
   byId('span-label').hidden = !spans;
   byId('span').replaceChildren(...(spans ?? []).map(([seconds, text]) => el('option', { value: seconds }, text)));
+  // What is called while the dialog is open, or later, nobody has seen.
+  const { seen } = state;
   byId('order').showModal();
   byId('order-give').onclick = async () => {
     const by = byId('by').value.trim();
@@ -183,7 +186,7 @@ function orders(kind, benchmark) {
     localStorage.setItem('slipwatch-by', by);
     try {
       const why = byId('why').value.trim() || null;
-      await order({ order: kind, benchmark, by, why, ...(spans ? { seconds: Number(byId('span').value) } : {}) });
+      await order({ order: kind, benchmark, by, why, seen, ...(spans ? { seconds: Number(byId('span').value) } : {}) });
       byId('order').close();
       changed();
     } catch (error) {

@@ -63,10 +63,11 @@ export class SitePage {
       const seen = site.acknowledged_by[alert.key];
       const standing = site.benchmarks.find((one) => one.benchmark === alert.benchmark);
       const own = standing && standing.level === alert.level ? standing : null;
+      const advised = own || (alert.level === 'unknown' && standing?.level === 'green');
       return el('li', {}, badge(alert.level), ' ', el('a', { href: place(alert.benchmark) }, alert.benchmark), ' since ', when(own?.since ?? alert.time),
-        own ? el('div', {}, el('strong', {}, own.recommended)) : null,
+        advised ? el('div', {}, el('strong', {}, standing.recommended)) : null,
         el('div', {}, ...local(alert.text)),
-        seen ? el('div', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'} at `, when(seen.time)) : null);
+        seen ? el('div', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'} at `, when(seen.given_at ?? seen.time)) : null);
     });
     const quiet = site.silences.map((one) => el('li', {}, `${one.benchmark ?? 'the whole site'}: ${described(one)}`));
     const nodes = [items.length ? el('ul', { class: 'log', tabindex: '0' }, items) : el('p', { class: 'soft' }, 'No alert is in force.')];

@@ -1,0 +1,71 @@
+//! Whether a broker is reached, as it stands among the faults: a connection that ends within seconds each time is none.
+
+use crate::config::Broker;
+use crate::runtime::clock::Stopwatch;
+use crate::runtime::service_faults::{FaultPlace, ServiceFaultKind, ServiceFaults};
+use std::time::Duration;
+use tokio::task::JoinSet;
+
+/// A connection that has stood for so long is reached.
+const STEADY: Duration = Duration::from_secs(10);
+/// So many in a row that ended sooner are no accident.
+const MOST_SHORT: u32 = 3;
+
+/// The connection of one source.
+pub(super) struct Connection {
+    faults: ServiceFaults,
+    place: FaultPlace,
+    broker: Broker,
+    client: String,
+    /// Since when it stands.
+    since: Option<Stopwatch>,
+    /// How many in a row have ended within [`STEADY`].
+    short: u32,
+    /// Ends the fault once it is steady.
+    settling: JoinSet<()>,
+}
+
+impl Connection {
+    /// One that does not stand yet.
+    pub(super) fn new(broker: &Broker, client: &str, faults: &ServiceFaults) -> Self {
+        Self {
+            faults: faults.clone(),
+            place: FaultPlace::of_source(ServiceFaultKind::BrokerUnreachable, &broker.id),
+            broker: broker.clone(),
+            client: client.to_owned(),
+            since: None,
+            short: 0,
+            settling: JoinSet::new(),
+        }
+    }
+
+    /// The broker has accepted it.
+    pub(super) fn begins(&mut self) {
+        self.since = Some(Stopwatch::start());
+        let (faults, place) = (self.faults.clone(), self.place.clone());
+        self.settling.spawn(async move {
+            tokio::time::sleep(STEADY).await;
+            faults.is_over(&place);
+        });
+    }
+
+    /// It has ended, or there was none.
+    pub(super) fn ends(&mut self, error: &str) {
+        self.settling.abort_all();
+        self.short = match self.since.take() {
+            Some(since) if since.elapsed() < STEADY => self.short + 1,
+            Some(_) | None => 0,
+        };
+        let (host, port) = (&self.broker.address.host, self.broker.address.port);
+        let taken = if self.short >= MOST_SHORT {
+            format!(
+                " ({} connections in a row ended within seconds: is another client of the name {:?} at work, such as a daemon on a copy of this state?)",
+                self.short, self.client
+            )
+        } else {
+            String::new()
+        };
+        let text = format!("no connection to {host}:{port}: {error}{taken}");
+        self.faults.lasts(self.place.clone(), &text);
+    }
+}
