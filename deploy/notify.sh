@@ -10,7 +10,11 @@ firing) state=called ;;
 resolved) state=ended ;;
 *) state=corrected ;;
 esac
-line="[$SLIPWATCH_STATUS] $SLIPWATCH_SITE: $SLIPWATCH_LEVEL $state at benchmark ${SLIPWATCH_BENCHMARK:-(site)}, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+, collapse forecast (median) $SLIPWATCH_FAILURE_TIME}${SLIPWATCH_TEXT:+. $SLIPWATCH_TEXT}${SLIPWATCH_RECOMMENDED:+. $SLIPWATCH_RECOMMENDED}"
+forecast=
+if [ "$SLIPWATCH_STATE" = firing ]; then
+    forecast=${SLIPWATCH_FAILURE_TIME:+, collapse forecast (median) $SLIPWATCH_FAILURE_TIME}
+fi
+line="[$SLIPWATCH_STATUS] $SLIPWATCH_SITE: $SLIPWATCH_LEVEL $state at benchmark ${SLIPWATCH_BENCHMARK:-(site)}, $SLIPWATCH_TIME$forecast${SLIPWATCH_RECOMMENDED:+. $SLIPWATCH_RECOMMENDED}${SLIPWATCH_TEXT:+ $SLIPWATCH_TEXT}"
 if [ $# -gt 0 ]; then
     echo "$line" >>"$1"
 else

@@ -28,6 +28,8 @@ firing) state=called ;;
 resolved) state=ended ;;
 *) state=corrected ;;
 esac
+# 2017-06-06 19:00 CEST of 2017-06-06T17:00:00Z, by the clocks at the site.
+at_the_site() { TZ=${SLIPWATCH_TIME_ZONE:-UTC} date -d "$1" '+%Y-%m-%d %H:%M %Z' 2>/dev/null || printf '%s' "$1"; }
 # A header holds ASCII alone (RFC 2047).
 encoded() {
     case $1 in
@@ -41,15 +43,19 @@ encoded() {
     printf 'MIME-Version: 1.0\nContent-Type: text/plain; charset=utf-8\nContent-Transfer-Encoding: 8bit\n'
     # The same at each attempt: a mail program shows a repetition as what it is.
     printf 'X-Slipwatch-Key: %s\n\n' "$(encoded "$(plain "$SLIPWATCH_KEY")")"
-    printf '%s: %s %s at %s, %s\n' "$site" "$SLIPWATCH_LEVEL" "$state" "$place" "$SLIPWATCH_TIME"
-    if [ -n "${SLIPWATCH_TEXT:-}" ]; then
-        printf '\n%s.\n' "$(plain "$SLIPWATCH_TEXT")"
-    fi
+    printf '%s: %s %s at %s, %s\n' "$site" "$SLIPWATCH_LEVEL" "$state" "$place" "$(at_the_site "$SLIPWATCH_TIME")"
     if [ -n "${SLIPWATCH_RECOMMENDED:-}" ]; then
-        printf '\nWhat to do: %s\n\n' "$(plain "$SLIPWATCH_RECOMMENDED")"
+        printf '\nWhat to do: %s\n' "$(plain "$SLIPWATCH_RECOMMENDED")"
     fi
-    if [ -n "${SLIPWATCH_FAILURE_TIME:-}" ]; then
-        printf 'Collapse forecast (median): %s\n' "$SLIPWATCH_FAILURE_TIME"
+    case $SLIPWATCH_LEVEL/$SLIPWATCH_STATE in
+    red/resolved | orange/resolved)
+        printf '\nThis is no all-clear: somebody has to look at the slope before anyone goes back.\n' ;;
+    esac
+    if [ -n "${SLIPWATCH_TEXT:-}" ]; then
+        printf '\n%s.\n\n' "$(plain "$SLIPWATCH_TEXT")"
+    fi
+    if [ -n "${SLIPWATCH_FAILURE_TIME:-}" ] && [ "$SLIPWATCH_STATE" = firing ]; then
+        printf 'Collapse forecast (median): %s\n' "$(at_the_site "$SLIPWATCH_FAILURE_TIME")"
     fi
     if [ -n "${SLIPWATCH_ACKNOWLEDGE_URL:-}" ]; then
         printf 'To acknowledge (the link works once): %s\n' "$(plain "$SLIPWATCH_ACKNOWLEDGE_URL")"

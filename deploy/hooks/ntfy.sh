@@ -25,6 +25,8 @@ firing) state=called ;;
 resolved) state=ended ;;
 *) state=corrected ;;
 esac
+# 2017-06-06 19:00 CEST of 2017-06-06T17:00:00Z, by the clocks at the site.
+at_the_site() { TZ=${SLIPWATCH_TIME_ZONE:-UTC} date -d "$1" '+%Y-%m-%d %H:%M %Z' 2>/dev/null || printf '%s' "$1"; }
 # A header holds ASCII alone (RFC 2047).
 encoded() {
     case $1 in
@@ -32,8 +34,23 @@ encoded() {
     *) printf '%s' "$1" ;;
     esac
 }
-title="[$SLIPWATCH_STATUS] $(plain "$SLIPWATCH_SITE"): $SLIPWATCH_LEVEL $state"
-text="$place, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+; collapse forecast (median) $SLIPWATCH_FAILURE_TIME}${SLIPWATCH_TEXT:+. $SLIPWATCH_TEXT}${SLIPWATCH_RECOMMENDED:+. $SLIPWATCH_RECOMMENDED}"
+# A locked telephone shows the title and the first words.
+level=$(printf '%s' "$SLIPWATCH_LEVEL" | tr '[:lower:]' '[:upper:]')
+case $SLIPWATCH_STATUS in
+Actual) mark= ;;
+*) mark="$(printf '%s' "$SLIPWATCH_STATUS" | tr '[:lower:]' '[:upper:]'): " ;;
+esac
+title="$mark$level $state: $(plain "$SLIPWATCH_SITE"), $place"
+case $SLIPWATCH_LEVEL/$SLIPWATCH_STATE in
+*/firing) todo=${SLIPWATCH_RECOMMENDED:-} ;;
+red/resolved | orange/resolved) todo='This is no all-clear: somebody has to look at the slope before anyone goes back.' ;;
+*) todo= ;;
+esac
+forecast=
+if [ -n "${SLIPWATCH_FAILURE_TIME:-}" ] && [ "$SLIPWATCH_STATE" = firing ]; then
+    forecast="; collapse forecast (median) $(at_the_site "$SLIPWATCH_FAILURE_TIME")"
+fi
+text="${todo:+$todo }At $(at_the_site "$SLIPWATCH_TIME")$forecast${SLIPWATCH_TEXT:+; $SLIPWATCH_TEXT}"
 token_file="$(dirname "$0")/ntfy.token"
 if [ -r "$token_file" ]; then
     # Over standard input: the command line can be read by everyone on the machine.

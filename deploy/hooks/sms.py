@@ -23,11 +23,14 @@ The packaged unit has no devices. `systemctl edit slipwatch`:
 import fcntl
 import json
 import os
+import re
 import sys
 import termios
 import time
 import tty
 import unicodedata
+from datetime import datetime
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 ANSWER_S = 20.0
 # A letter that needs two places in the letters of a modem, such as a bracket, makes a message of 160 two messages.
@@ -87,9 +90,13 @@ def plain(text):
     return "".join(letter if letter.isprintable() else " " for letter in letters)
 
 
-def minute(time):
-    """2017-06-07 03:00 UTC of 2017-06-07T03:00:00Z."""
-    return f"{time[:16].replace('T', ' ')} UTC" if time.endswith("Z") else time
+def minute(time, zone):
+    """2017-06-07 05:00 CEST of 2017-06-07T03:00:00Z in Europe/Rome."""
+    try:
+        instant = datetime.fromisoformat(f"{time[:19]}+00:00")
+        return instant.astimezone(ZoneInfo(zone)).strftime("%Y-%m-%d %H:%M %Z")
+    except (ValueError, ZoneInfoNotFoundError):
+        return time
 
 
 def message(environment, alert):
@@ -104,15 +111,24 @@ def message(environment, alert):
     words = [] if status == "Actual" else [f"{status.upper()}, do not act on this:"]
     words.append(f"{level.upper()}{STATES.get(state, ' corrected')}:")
     words.append(f"{environment['SLIPWATCH_SITE']}, {place}.")
+    zone = environment.get("SLIPWATCH_TIME_ZONE") or "UTC"
     if state == "firing" and level in TO_DO:
         words.append(f"{TO_DO[level]}.")
+    if state == "resolved" and level in ("red", "orange"):
+        words.append("No all-clear: look at the slope first.")
     forecast = environment.get("SLIPWATCH_FAILURE_TIME")
-    if forecast:
-        words.append(f"Collapse forecast {minute(forecast)}.")
-    # The place and the level stand above already.
-    _, _, figures = alert.get("text", "").partition("; ")
-    words.append(f"At {minute(environment['SLIPWATCH_TIME'])}{': ' if figures else ''}{figures}")
-    return plain(" ".join(words))[:LONGEST].rstrip()
+    if forecast and state == "firing":
+        words.append(f"Collapse forecast {minute(forecast, zone)}.")
+    # The place and the level stand above already, and by which span a chance counts is too long for this.
+    _, _, figures = alert.get("text", "").partition(": ")
+    figures = figures.removeprefix(level).removeprefix(" ends").lstrip("; ")
+    figures = re.sub(r" \([^)]*\)", "", figures).replace(" %", "%")
+    words.append(f"At {minute(environment['SLIPWATCH_TIME'], zone)}{': ' if figures else ''}{figures}")
+    text = plain(" ".join(words))
+    if len(text) > LONGEST:
+        # Not within a word: half a figure is another figure.
+        text = text[: LONGEST + 1].rpartition(" ")[0]
+    return text.rstrip(" ;,")
 
 
 def main():

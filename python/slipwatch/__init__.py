@@ -123,7 +123,7 @@ class Recording:
 def read(
     files: str | PathLike[str] | Iterable[str | PathLike[str]], columns: Sequence[str] = ()
 ) -> Recording:
-    """Reads CSV, NDJSON, TOA5 or MCAP by the names' endings; a later file stands over an earlier one.
+    """Reads CSV, NDJSON, TOA5 or MCAP by the names' endings; values of a later file replace those of an earlier one.
 
     `columns` say what a column means whose name does not: "NAME=ID:QUANTITY:UNIT".
     """

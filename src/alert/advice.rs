@@ -39,7 +39,7 @@ impl Policy {
     /// What a red that is pending waits for.
     pub fn pending_red_in_words(&self) -> String {
         format!(
-            ", which calls red once it is {} in the mean over some {}",
+            ", which calls red once it is {} on average over about the last {}",
             rounded(self.red_mean_chance()),
             span_in_words(self.red_course())
         )
@@ -66,14 +66,14 @@ impl Policy {
                 self.critical_velocity_mm_per_day
             ),
             (RED_CHANCE, Level::Orange) => format!(
-                "{}, which calls red, and of {} or more, but not yet of {}, in the mean over some {}",
+                "{}, which calls red, and of {} or more, but not yet of {}, on average over about the last {}",
                 self.chance_for_red_in_words(),
                 rounded(self.red_near_chance()),
                 rounded(self.red_mean_chance()),
                 span_in_words(self.red_course())
             ),
             (RED_CHANCE, _) => format!(
-                "{}, and of {} or more in the mean over some {}, or of {} at one reading",
+                "{}, and of {} or more on average over about the last {}, or of {} at one reading",
                 self.chance_for_red_in_words(),
                 rounded(self.red_mean_chance()),
                 span_in_words(self.red_course()),
@@ -128,7 +128,7 @@ mod tests {
         assert_eq!(
             condition("chance-within-evacuation-time", Level::Red),
             "chance of collapse of 0.27 or more within twice the evacuation time (48 h) and until the next reading, and of \
-             0.198 or more in the mean over some 12 h, or of 0.597 at one reading"
+             0.198 or more on average over about the last 12 h, or of 0.597 at one reading"
         );
         let outlook = |level| condition("chance-within-outlook", level);
         assert!(outlook(Level::Orange).contains("of 0.7 or more within the outlook of 30 days"));

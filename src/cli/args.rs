@@ -101,10 +101,10 @@ pub struct FileArgs {
 /// How tables of text are written, where it is not as in CSV with RFC 3339 times.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct DialectArgs {
-    /// What parts the cells of a table: comma, semicolon or tab [default: as in the header]
+    /// What separates the cells of a table: comma, semicolon or tab [default: as in the header]
     #[arg(long, value_name = "MARK", value_parser = Delimiter::parse)]
     pub delimiter: Option<Delimiter>,
-    /// What stands before the decimals: point or comma [default: point]
+    /// The decimal mark: point or comma [default: point]
     #[arg(long, value_name = "MARK", value_parser = DecimalMark::parse)]
     pub decimal: Option<DecimalMark>,
     /// What parts the thousands of numbers: comma, point, blank or apostrophe [default: nothing]

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// Check a site's config and say everything that is wrong with it, and what its files hold
 ///
-/// Exits 1 where a benchmark is fed by no file: it would go unwatched.
+/// Exits 1 where a benchmark gets readings from no file: it would not be monitored.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The site's config; - reads stdin, with paths from the working folder

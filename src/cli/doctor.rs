@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 
-/// Check whether this machine can carry a site: files, state, brokers, hooks, clock, disk, watches, recordings
+/// Check whether this machine can run a site: files, state, brokers, hooks, clock, disk, watches, recordings
 ///
 /// Tries what the daemon will do, as the user who runs it: as root, give the daemon's user with --user.
 #[derive(Debug, clap::Args)]

@@ -143,7 +143,7 @@ fn text(report: &FitReport, is_held: bool) -> String {
     );
     let _ = writeln!(
         out,
-        "{}; rms {} {}, {} laws solved in {:.1} ms\n",
+        "{}; rms {} {}, the law solved {} times in {:.1} ms\n",
         report.termination,
         number(report.rms),
         report.unit,

@@ -30,12 +30,14 @@ pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
             .or(base.red_within.filter(|_| evacuation_time.is_none())),
         critical_velocity_mm_per_day: velocity
             .map_or(base.critical_velocity_mm_per_day, |given| given.value),
-        red_chance: section.chance("red_chance").unwrap_or(base.red_chance),
+        red_chance: section
+            .chance("red_chance", base.red_chance)
+            .unwrap_or(base.red_chance),
         orange_chance: section
-            .chance("orange_chance")
+            .chance("orange_chance", base.orange_chance)
             .unwrap_or(base.orange_chance),
         yellow_chance: section
-            .chance("yellow_chance")
+            .chance("yellow_chance", base.yellow_chance)
             .unwrap_or(base.yellow_chance),
         steady_for: given(steady_for.as_ref(), base.steady_for),
         thresholds: thresholds(&mut section, base),

@@ -48,6 +48,7 @@ impl Common {
             hours: self.hours,
             extra: self.extra,
             links: None,
+            zone: "UTC".to_owned(),
             folder: base.to_owned(),
             sandbox: false,
             writable: Vec::new(),

@@ -297,6 +297,8 @@ pub struct HookConfig {
     pub extra: ExtraMessages,
     /// By which links its alerts are acknowledged; `None`: by none.
     pub links: Option<Links>,
+    /// The zone that people at the site live in, by its IANA name.
+    pub zone: String,
     /// After this it is killed.
     pub timeout: Duration,
     /// Where it runs: the config's folder.

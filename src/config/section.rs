@@ -37,6 +37,9 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     if let Some(site) = &site {
         for hook in &mut hooks {
             hook.links.clone_from(&site.links);
+            if let Some(zone) = site.time_zone.iana_name() {
+                zone.clone_into(&mut hook.zone);
+            }
             let hours = hook.hours.take();
             hook.hours = hours.map(|hours| hours.in_zone(site.time_zone.clone()));
         }

@@ -176,8 +176,8 @@ impl<'t> Section<'t> {
         })
     }
 
-    /// A number strictly between 0 and 1.
-    pub(super) fn chance(&mut self, key: &'static str) -> Option<f64> {
+    /// A number strictly between 0 and 1; `example` is one that can be meant.
+    pub(super) fn chance(&mut self, key: &'static str, example: f64) -> Option<f64> {
         let value = self.get(key, ValueShape::Chance)?;
         match number(value.get_ref()) {
             Some(number) if number > 0.0 && number < 1.0 => Some(number),
@@ -185,7 +185,7 @@ impl<'t> Section<'t> {
                 self.error(
                     &value.span(),
                     format!("{} is not a chance", self.path(key)),
-                    "write a number between 0 and 1, such as 0.05",
+                    format!("write a number between 0 and 1, such as {example}"),
                 );
                 None
             }

@@ -1,4 +1,4 @@
-//! Whether a residual passes for noise: runs, autocorrelation with gaps, and the undeclared load that is left in it.
+//! Whether a residual can be distinguished from noise: runs, autocorrelation with gaps, and the undeclared load that is left in it.
 
 use super::frame::Frame;
 use super::noise::{Memory, Whitener};

@@ -158,7 +158,7 @@ pub struct DeclaredEffect {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Explained {
-    /// The residual after it passes for noise.
+    /// The residual after it cannot be distinguished from noise.
     Full,
     /// Structure is left, or another channel would do as well.
     Partly,
@@ -264,7 +264,7 @@ pub struct Candidate {
     pub rejected_because: Option<String>,
 }
 
-/// Whether the residual passes for noise.
+/// Whether the residual can be distinguished from noise.
 #[derive(Debug, Clone, PartialEq, Default, JsonSchema, Serialize)]
 pub struct ResidualTests {
     /// p-value of the runs test of the innovations.

@@ -5,6 +5,9 @@ use super::findings::Findings;
 use super::kind::Form;
 use super::search::SIGNIFICANT;
 
+/// A form whose error over the held-out readings is more than so many times as large is not open.
+const NO_WORSE: f64 = 1.2;
+
 /// A sentence for each effect of a covariate that its other form explains as well: by less than `margin` of the BIC apart, and not
 /// refused before a later block was asked.
 pub(super) fn left_open(findings: &Findings, margin: f64) -> Vec<String> {
@@ -22,7 +25,7 @@ fn is_other_form(effect: &Effect, one: &Candidate, margin: f64) -> bool {
     is_one_channel
         && effect.effect == one.effect
         && effect.form != one.form
-        && one.held_out.is_some()
+        && one.held_out.is_some_and(|ratio| ratio <= NO_WORSE)
         && (one.bic_gain - effect.bic_gain).abs() < margin
         && one.p_value.is_some_and(|p| p < SIGNIFICANT)
 }

@@ -49,8 +49,10 @@ impl Search<'_> {
             weight: ObjectionWeight::MayHaveActed,
         };
         if one.p_value >= SIGNIFICANT {
-            let share = 100.0 * one.p_value;
-            let why = format!("without any effect a search gains as much in {share:.0} % of cases");
+            let (share, most) = (100.0 * one.p_value, 100.0 * SIGNIFICANT);
+            let why = format!(
+                "without any effect a search gains as much in {share:.1} % of cases; under {most:.0} % is required"
+            );
             let is_nearly = one.term.channel.is_some() && one.p_value < NEARLY_SIGNIFICANT;
             return Some(if is_nearly && by_physics().is_none() {
                 may_have_acted(why)

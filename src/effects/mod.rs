@@ -86,6 +86,7 @@ pub use kind::{FaultKind, Form, Kind};
 pub use known::EFFECTS;
 pub use known_load::{Filtered, KnownLoad, Part, Wave};
 pub use options::Options;
+pub use outlook::EXPLAINED_DAYS;
 pub use partition::{Partition, partition, partition_candidate};
 pub use response::MOST_SAMPLES;
 pub use rival::Rival;

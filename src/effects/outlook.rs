@@ -8,6 +8,9 @@ use crate::forecast::{HORIZON_DAYS, Outlook, outlook};
 use crate::reading::{Channel, Series, after_days};
 use crate::regime::Regime;
 
+/// How far ahead the chance of a failure is asked for that an explanation gives, days.
+pub const EXPLAINED_DAYS: f64 = HORIZON_DAYS;
+
 /// The regimes of m > 1.
 const UNSTABLE: [Regime; 2] = [Regime::UnstableAccelerating, Regime::UnstableDecelerating];
 

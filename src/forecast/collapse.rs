@@ -44,6 +44,8 @@ const ALL_BUT_SURE: f64 = 0.01;
 /// A slope at this velocity, mm/day, or under it, is the less likely to collapse within a span: the slowest of 30 slopes that collapsed was
 /// last read at .475 mm/day (Federico et al. 2012).
 const SLOW: f64 = 0.25;
+/// The same however sure it is that it accelerates.
+const STILL: f64 = 0.1;
 /// Over how many shorter scales the growth of the velocity is looked for.
 const GROWN_SCALES: usize = 10;
 /// How far the growth of a slope that runs up departs from a straight line in inverse velocity, and what is left of the chance
@@ -284,16 +286,20 @@ fn goes_on(scales: &Scales, power: usize, accelerating: f64) -> f64 {
     let ever = view.ln_velocity(0) - highest;
     let has_slowed = (since.exp() / SLOWED).min(1.0) * ever.exp().min(1.0).powi(SURVIVED);
     let unsure = (1.0 - accelerating) / (1.0 - accelerating + ALL_BUT_SURE);
-    (has_slowed * is_fast(scales, power)).powf(unsure)
+    let fastest = fastest(scales, power);
+    (has_slowed * above(fastest, SLOW)).powf(unsure) * above(fastest, STILL)
 }
 
-/// The share of the chance within the span of scale `power` that is left to a slope for its velocity, the highest now of that scale and the shorter
-/// ones.
-fn is_fast(scales: &Scales, power: usize) -> f64 {
+/// The highest velocity now of the scale `power` and the shorter ones, mm/day.
+fn fastest(scales: &Scales, power: usize) -> f64 {
     let view = View::at(scales, power);
-    let fastest = (-view.span..=0).map(|shorter| view.ln_velocity(shorter));
-    let fastest = fastest.fold(f64::NEG_INFINITY, f64::max).exp();
-    1.0 / (1.0 + (SLOW / fastest).powi(4))
+    let each = (-view.span..=0).map(|shorter| view.ln_velocity(shorter));
+    each.fold(f64::NEG_INFINITY, f64::max).exp()
+}
+
+/// The share of a chance that is left to a slope of this velocity, where one at `slow` has half of it; both mm/day.
+fn above(velocity: f64, slow: f64) -> f64 {
+    1.0 / (1.0 + (slow / velocity).powi(4))
 }
 
 /// The share of the chance within such a span that is reported of a slope that may creep steadily: all scales

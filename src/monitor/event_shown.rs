@@ -4,6 +4,7 @@ use super::event::{AlertState, EventKind, FailureTime, SharedFailure, Summary, U
 use crate::alert::percent_in_words;
 use crate::effects::{Kind, Rival};
 use crate::reading::{BenchmarkId, Timestamp, figure, minute};
+use std::f64::consts::LOG10_E;
 
 /// How one kind of event is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -311,14 +312,13 @@ fn unexplained(what: &Unexplained) -> String {
         } => {
             let velocity = velocity_mm_per_day
                 .map_or_else(String::new, |v| format!(", {} mm/day", figure(v, 3)));
-            let how = if *surprise_nats > MOST_NATS {
-                format!("over e^{MOST_NATS:.0}")
+            let decades = (surprise_nats * LOG10_E).floor();
+            let how = if *surprise_nats > MOST_NATS || decades < 1.0 {
+                "far".to_owned()
             } else {
-                format!("e^{surprise_nats:.0}")
+                format!("over 10^{decades:.0} times")
             };
-            format!(
-                "unexplained residual: {how} times less likely than the usual reading{velocity}"
-            )
+            format!("unexplained residual: {how} less likely than the usual reading{velocity}")
         }
         Unexplained::Structure {
             bic_gain,

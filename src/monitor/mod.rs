@@ -379,6 +379,10 @@ impl Monitor {
         if declared.is_maintained(time) || !self.outages.note_missing(benchmark, time, what) {
             return Vec::new();
         }
+        if let Some(track) = self.benchmarks.get_mut(benchmark) {
+            track.note_missing(time);
+            self.benchmarks.note_changed(benchmark);
+        }
         let kind = EventKind::Fault {
             kind: "sensor-fault".to_owned(),
             text: format!("benchmark {benchmark}: no reading at {time}; the sensor gives {what}"),

@@ -37,7 +37,7 @@ pub struct SearchJob {
 pub struct SearchFinding {
     /// Whose readings.
     pub benchmark: BenchmarkId,
-    /// The effects that were accepted, the verdict first; none where the residual passes for noise or stays
+    /// The effects that were accepted, the verdict first; none where the residual cannot be distinguished from noise or stays
     /// unexplained.
     pub effects: Vec<Effect>,
     /// How much of the structure they account for.

@@ -34,6 +34,9 @@ pub(super) struct Silence {
     #[serde(default)]
     waiting: Option<Timestamp>,
     spacings: VecDeque<SignedDuration>,
+    /// How long after the only reading the sensor first gave something else instead of one.
+    #[serde(default)]
+    missing: Option<SignedDuration>,
     /// When the newest gaps began that are far longer than the usual spacing, and how long they were.
     #[serde(default)]
     gaps: VecDeque<(Timestamp, SignedDuration)>,
@@ -210,6 +213,15 @@ impl Silence {
         Some(self.newest?.max(self.waiting.unwrap_or(Timestamp::MIN)))
     }
 
+    /// At `time` the sensor gave something else instead of a reading.
+    pub(super) fn note_missing(&mut self, time: Timestamp) {
+        let after = self.newest.map(|newest| time.duration_since(newest));
+        let is_later = after.is_some_and(|after| after.is_positive());
+        if is_later && self.spacings.is_empty() && self.missing.is_none() {
+            self.missing = after;
+        }
+    }
+
     /// When silence becomes a fault; `None` when it already is one.
     pub(super) fn deadline(&self) -> Option<Timestamp> {
         if self.silent { None } else { self.due() }
@@ -297,7 +309,9 @@ impl Silence {
     fn allowed_in_time(&self) -> Option<SignedDuration> {
         let longest = self.spacings.iter().max().copied();
         let allowed = match longest {
-            None => FIRST,
+            // Where the next one was due the sensor has shown.
+            None => (self.missing.and_then(|after| after.checked_mul(MAY_SKIP)))
+                .map_or(FIRST, |allowed| allowed.min(FIRST)),
             // Two or three readings say little of how often there are some.
             Some(longest) if self.spacings.len() < 3 => longest.checked_mul(MAY_SKIP)?,
             // The longest gap seen lately is no silence either.
@@ -378,6 +392,17 @@ mod tests {
             }
         }
         silence
+    }
+
+    #[test]
+    fn a_sensor_that_gives_one_reading_and_then_none_is_silent_after_a_few_of_its_intervals() {
+        let mut silence = Silence::default();
+        silence.note_missing(at(0.0));
+        silence.broken_by(at(0.0));
+        assert_eq!(silence.deadline(), Some(at(8.0 * 24.0)));
+        silence.note_missing(at(1.0));
+        silence.note_missing(at(2.0));
+        assert_eq!(silence.deadline(), Some(at(4.0)));
     }
 
     #[test]

@@ -64,7 +64,7 @@ impl SummerTime {
             "later" => Ok(Self::Later),
             "standard" => Ok(Self::Standard),
             _ => Err(
-                "write reject, earlier, later or standard (a logger that is never put forward)"
+                "write reject, earlier, later or standard (a logger without summer time)"
                     .to_owned(),
             ),
         }

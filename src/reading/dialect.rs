@@ -9,9 +9,9 @@ use jiff::{SignedDuration, Timestamp};
 /// What holds for every file of a source, where it is not as in CSV with RFC 3339 times.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Dialect {
-    /// What parts the cells; with none, it is that of the header, see [`Delimiter::of_header`].
+    /// What separates the cells; with none, it is that of the header, see [`Delimiter::of_header`].
     pub delimiter: Option<Delimiter>,
-    /// What stands before the decimals.
+    /// The decimal mark.
     pub decimal: DecimalMark,
     /// What parts the thousands of numbers, where something does.
     pub thousands: Option<ThousandsMark>,
@@ -136,7 +136,7 @@ impl Dialect {
     }
 }
 
-/// What parts the cells of a row.
+/// What separates the cells of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Delimiter {
     /// `,`
@@ -190,7 +190,7 @@ impl Delimiter {
     }
 }
 
-/// What stands before the decimals of a number.
+/// The decimal mark of a number.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum DecimalMark {
     /// `12.5`

@@ -115,6 +115,12 @@ impl Alarms {
         })
     }
 
+    /// Whether nothing is known of a place, and nobody has acknowledged that.
+    fn is_unseen_unknown(&self, place: Option<&BenchmarkId>) -> bool {
+        let unknown = self.unknown.get(&place.cloned());
+        unknown.is_some_and(|event| !self.orders.of(event).any(|order| says_seen(&order.event)))
+    }
+
     /// How that of a place stands, `None` of the whole site, where its newest forecast calls for `called`.
     pub fn state(&self, place: Option<&BenchmarkId>, called: Option<&CalledLevel>) -> AlarmState {
         let newest = self.newest.get(&place.cloned());
@@ -134,6 +140,7 @@ impl Alarms {
                     AlarmState::Acknowledged
                 }
             }
+            _ if self.is_unseen_unknown(place) => AlarmState::Unacknowledged,
             Some(one) if !one.is_acknowledged => AlarmState::ReturnedUnacknowledged,
             _ if called.is_some_and(|called| !called.pending.is_empty()) => AlarmState::Pending,
             _ => AlarmState::Normal,

@@ -1,8 +1,10 @@
 //! The daemon's work loop: takes what comes, lets time go by, carries out people's orders, takes up another config on request.
 
 mod reload;
+mod turns;
 mod upkeep;
 
+use self::turns::PreferredSource;
 use super::beside::SideTasks;
 use super::clock::Stopwatch;
 use super::deliver::{Dispatcher, Retry};
@@ -25,7 +27,6 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::signal::unix::Signal;
 use tokio::sync::watch;
-use tokio::time::{Interval, MissedTickBehavior};
 
 /// How long the hooks may take to finish when the daemon stops, and those of a former config.
 pub(super) const DRAIN_LIMIT: Duration = Duration::from_secs(20);
@@ -63,6 +64,8 @@ pub struct Daemon {
     /// Since the last commit.
     since_commit: Stopwatch,
     since_orders: Stopwatch,
+    since_tick: Stopwatch,
+    preferred: PreferredSource,
     /// Lines, records and files that could not be used, as the state has it.
     quarantined: BTreeMap<String, u64>,
     /// What lasts and keeps it from its work, as it has written it into the state folder.
@@ -110,6 +113,8 @@ impl Daemon {
             positions: Vec::new(),
             since_commit: Stopwatch::start(),
             since_orders: Stopwatch::start(),
+            since_tick: Stopwatch::start(),
+            preferred: PreferredSource::Files,
             quarantined: BTreeMap::new(),
             faults: None,
             verified: Verified::default(),
@@ -145,40 +150,6 @@ impl Daemon {
                 is_caught_up,
             });
         }
-    }
-
-    /// When time is let pass where nothing comes.
-    pub(super) fn ticks() -> Interval {
-        let mut tick = tokio::time::interval(TICK);
-        tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        tick
-    }
-
-    /// Takes what comes next, or lets time go by; `false` when the source has ended.
-    pub(super) async fn take_next(
-        &mut self,
-        tick: &mut Interval,
-        shutdown: &Shutdown,
-    ) -> Result<bool, StoreError> {
-        tokio::select! {
-            biased;
-            batch = self.sources.batches.recv(), if !self.site.is_stalled() => {
-                let Some(batch) = batch else { return Ok(false) };
-                tokio::task::block_in_place(|| self.take_batch(batch, shutdown))?;
-            }
-            Some(delivery) = self.sources.deliveries.recv(), if !self.site.is_stalled() && self.sources.has_room() => {
-                tokio::task::block_in_place(|| self.take_messages(delivery))?;
-            }
-            _ = tick.tick() => tokio::task::block_in_place(|| self.tick())?,
-            () = tokio::time::sleep(QUIET), if self.site.queues() => {
-                tokio::task::block_in_place(|| self.judge_queued())?;
-            }
-            // Last, so that it keeps nothing else waiting.
-            () = std::future::ready(()), if self.site.has_review_pending() => {
-                tokio::task::block_in_place(|| self.look_back())?;
-            }
-        }
-        Ok(true)
     }
 
     /// Steps the monitor through a batch; a stop that is asked for half-way ends it after a value, and the rest of
@@ -217,10 +188,11 @@ impl Daemon {
         }
         self.positions.extend(batch.positions);
         self.files_are_read = batch.caught_up;
-        // Of a backlog one batch follows another, and time is not let pass.
-        if self.since_orders.elapsed() >= TICK {
-            self.take_orders()?;
+        if !batch.caught_up {
+            self.preferred = PreferredSource::Messages;
         }
+        // Of a backlog one batch follows another, and time is not let pass.
+        self.take_orders_in_time()?;
         if batch.caught_up {
             self.decide();
         } else {
@@ -295,6 +267,7 @@ impl Daemon {
             self.sources.receive_more(&mut waiting);
             next = waiting.pop_front();
         }
+        self.take_orders_in_time()?;
         if self.is_up_to_date {
             self.decide();
         }
@@ -455,12 +428,21 @@ impl Daemon {
         Ok(())
     }
 
+    /// The same where it is time, however much comes.
+    fn take_orders_in_time(&mut self) -> Result<(), StoreError> {
+        if self.since_orders.elapsed() >= TICK {
+            self.take_orders()?;
+        }
+        Ok(())
+    }
+
     /// What is due whether anything comes or not.
     ///
     /// # Errors
     /// When the state cannot be used any more.
     pub fn tick(&mut self) -> Result<(), StoreError> {
         let now = (self.host_time)();
+        self.since_tick = Stopwatch::start();
         self.take_orders()?;
         // Data time is the clock's only once the past has been read.
         if self.is_caught_up {

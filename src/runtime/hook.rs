@@ -304,6 +304,9 @@ impl HookOutcome {
     }
 }
 
+/// In which people at the site live: what a hook shows times in, which it gets in UTC.
+const TIME_ZONE: &str = "SLIPWATCH_TIME_ZONE";
+
 /// Runs the program of `hook` for `alert`; `attempt` counts from 1.
 pub(super) async fn run_program(
     hook: &HookConfig,
@@ -383,7 +386,7 @@ fn start(hook: &HookConfig, variables: &[(&str, String)], run: &str) -> Result<C
     for (name, value) in variables {
         command.env(name, capped(value));
     }
-    command.env(RUN, run);
+    command.env(RUN, run).env(TIME_ZONE, &hook.zone);
     command
         .spawn()
         .map_err(|error| format!("{}: {error}", program.display()))

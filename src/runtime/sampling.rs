@@ -1,6 +1,6 @@
 //! What is doubtful in the readings of a site, by what lies in its files now: above all how rarely it is measured.
 
-use super::preview::Preview;
+use super::preview::{Preview, SourceView};
 use crate::config::Config;
 use crate::monitor::MAY_SKIP;
 use crate::reading::{BenchmarkId, Timestamp, figure};
@@ -13,6 +13,23 @@ const READINGS_AN_EVACUATION: i32 = 4;
 /// Readings that end so long, and so many of their own intervals, before the newest of their source are left behind.
 const LEFT_BEHIND: SignedDuration = SignedDuration::from_hours(24);
 const LEFT_OUT: i32 = 12;
+
+/// A line where more of a source's files is refused than taken.
+fn mostly_refused(source: &SourceView, preview: &Preview) -> Option<String> {
+    let own = preview
+        .benchmarks
+        .iter()
+        .filter(|one| one.source == source.id);
+    let taken: u64 = own.map(|one| one.readings).sum();
+    let refused: u64 = source.refused.iter().map(|one| one.rows).sum();
+    let most = source.refused.iter().max_by_key(|one| one.rows)?;
+    (refused > taken).then(|| {
+        format!(
+            "source {:?}: {refused} rows or cells of its files are refused, and {taken} readings are taken; the first of the most frequent kind: {}",
+            source.id, most.first
+        )
+    })
+}
 
 /// A line for each benchmark that is measured too rarely for its evacuation time to mean anything, or not at all, or
 /// whose readings hardly mean what was intended.
@@ -46,6 +63,10 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
     let behind = left_behind(preview);
     let waiting = held_back(config, preview);
     let ends = preview.refused_ends.iter().cloned();
+    let refused = preview
+        .sources
+        .iter()
+        .filter_map(|source| mostly_refused(source, preview));
     let absent = preview
         .without_readings
         .iter()
@@ -57,6 +78,7 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
         .chain(shared)
         .chain(behind)
         .chain(waiting)
+        .chain(refused)
         .chain(ends)
         .chain(absent)
         .collect()

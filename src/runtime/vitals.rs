@@ -303,7 +303,8 @@ impl Vitals {
             .collect()
     }
 
-    /// How many benchmarks stand at each level, all of them; those at `unknown` count there as well.
+    /// How many benchmarks stand at each level, all of them; those at `unknown` count there, and at the level beside it where that is above
+    /// green.
     pub fn levels(&self) -> [(Level, usize); 5] {
         let points = locked(&self.points);
         [
@@ -316,7 +317,8 @@ impl Vitals {
         .map(|level| {
             let stands = |point: &&VitalsPoint| match level {
                 Level::Unknown => point.is_unknown,
-                Level::Green | Level::Yellow | Level::Orange | Level::Red => point.level == level,
+                Level::Green => point.level == level && !point.is_unknown,
+                Level::Yellow | Level::Orange | Level::Red => point.level == level,
             };
             (level, points.values().filter(stands).count())
         })

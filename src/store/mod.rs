@@ -200,6 +200,10 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn open(folder: &Path) -> Result<Self, StoreError> {
+        Self::open_at(folder).map_err(|error| access::explained(error, folder))
+    }
+
+    fn open_at(folder: &Path) -> Result<Self, StoreError> {
         std::fs::create_dir_all(folder)?;
         let lock = lock(folder)?;
         let mut connection = Connection::open(folder.join(FILE))?;

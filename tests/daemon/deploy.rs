@@ -85,7 +85,8 @@ fn the_command_of_the_weekly_report_writes_a_page_from_a_state() {
         .lines()
         .find_map(|line| line.strip_prefix("ExecStart=slipwatch "));
     let folder = tempfile::tempdir().unwrap();
-    let site = "[site]\nname = \"A slope\"\nstate_dir = \"state\"\n[[source]]\nid = \"l\"\nkind = \"csv\"\npath = \"in.csv\"\n";
+    let site = "[site]\nname = \"A slope\"\nstate_dir = \"state\"\n[[source]]\nid = \"l\"\nkind = \"csv\"\npath = \"in.csv\"\n\
+                [[benchmark]]\nid = \"<5>\"\nsource = \"l\"\n[[benchmark]]\nid = \"never\"\nsource = \"l\"\n";
     std::fs::write(folder.path().join("site.toml"), site).unwrap();
     let state = folder.path().join("state");
     let store = slipwatch::store::Store::open(&state).unwrap();
@@ -120,8 +121,16 @@ fn the_command_of_the_weekly_report_writes_a_page_from_a_state() {
     let page = folder.path().join("reports/report-2026-01-20.html");
     let page = std::fs::read_to_string(page).unwrap();
     assert!(page.contains("<h1>A slope</h1>") && page.contains("Benchmark &lt;5&gt;"));
-    // A week, and four before it for the figures: the record is shorter.
-    assert!(page.contains("480 readings"), "{page:.2000}");
+    // Of a week, to the end; the figures show four weeks before it too.
+    assert!(
+        page.contains("169 readings, 2026-01-13 23:00Z to 2026-01-20 23:00Z"),
+        "{page:.2000}"
+    );
+    // One that has never read is in it.
+    assert!(
+        page.contains("never</a>: nothing is known; no reading since 2026-01-13 23:00Z"),
+        "{page:.2000}"
+    );
 }
 
 #[test]

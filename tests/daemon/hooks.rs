@@ -52,6 +52,7 @@ fn hook(script: &str) -> (TempDir, HookConfig) {
     let config = HookConfig {
         extra: ExtraMessages::default(),
         links: None,
+        zone: "UTC".to_owned(),
         site: false,
         to: None,
         escalate_after: None,

@@ -373,6 +373,42 @@ async fn a_message_that_the_broker_keeps_does_not_undo_a_correction() {
     assert_eq!(daemon.newest_of("2017-06-02T00:00:00Z"), Some(2.5));
 }
 
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn a_red_by_a_broker_does_not_wait_until_a_long_file_has_been_read() {
+    let broker = Mosquitto::start();
+    let daemon = Daemon::start_with(
+        &broker,
+        "[[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"*.csv\"\n\
+         [[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"100 mm\"\n\
+         [[hook]]\nrun = [\"/bin/sh\", \"-c\", \"echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> notified\"]\n",
+    );
+    daemon.wait("caught up", |daemon| {
+        daemon.text("log").contains("caught up")
+    });
+    let now = slipwatch::runtime::clock::now();
+    let of = |minutes: i64, value: f64| {
+        let time = now - jiff::SignedDuration::from_mins(minutes);
+        format!(r#"{{"benchmark":"5","time":"{time}","value":{value},"unit":"mm"}}"#)
+    };
+    broker.publish(&[of(20, 0.0), of(10, 0.1)]).await;
+    daemon.wait("both are read", |daemon| daemon.readings() == 2);
+    let rows: i64 = 120_000;
+    let text = (0..rows).map(|row| {
+        let time = now - jiff::SignedDuration::from_mins(rows - row);
+        format!("{time},{}\n", row % 7)
+    });
+    let text = format!("time,9_displacement_mm\n{}", text.collect::<String>());
+    std::fs::write(daemon.0.path().join("9.csv"), text).unwrap();
+    daemon.wait("the file is being read", |daemon| daemon.readings() > 2);
+    broker.publish(&[of(0, 130.0)]).await;
+    daemon.wait("the red", |daemon| {
+        daemon.text("notified").contains("5/red/")
+    });
+    let read = daemon.readings();
+    assert!(i64::try_from(read).unwrap() < rows, "{read}");
+}
+
 /// Publishes a message of 17 MiB, and a reading after it.
 async fn publish_long_and_next(broker: &Mosquitto) -> tokio::task::JoinHandle<()> {
     let long = "x".repeat(17 << 20);

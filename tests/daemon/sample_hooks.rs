@@ -46,6 +46,7 @@ fn run_with(
         .env("SLIPWATCH_FAILURE_TIME", "2017-06-07T03:00:00Z")
         .env("SLIPWATCH_ATTEMPT", "1")
         .env("SLIPWATCH_STATUS", status)
+        .env("SLIPWATCH_TIME_ZONE", "Europe/Rome")
         .env(
             "SLIPWATCH_TEXT",
             "benchmark 5: red; chance of collapse 57 % within 48 h",
@@ -97,9 +98,9 @@ fn an_email_goes_to_each_address_with_the_alert_in_it_and_no_name_forges_a_heade
         "{head}"
     );
     for part in [
-        "Collapse forecast (median): 2017-06-07T03:00:00Z",
+        "Monte Toc: red called at 5Bcc: all@example.org, 2017-06-06 19:00 CEST\n\nWhat to do: Evacuate the area.\n",
+        "Collapse forecast (median): 2017-06-07 05:00 CEST",
         "\nbenchmark 5: red; chance of collapse 57 % within 48 h.\n",
-        "\nWhat to do: Evacuate the area.\n",
         r#""text": "benchmark 5: red; chance"#,
     ] {
         assert!(body.contains(part), "{part}: {body}");
@@ -148,7 +149,7 @@ fn answering(status: &'static str) -> (String, thread::JoinHandle<String>) {
     let got = thread::spawn(move || {
         let (mut stream, _) = listener.accept().unwrap();
         let (mut got, mut part) = (String::new(), [0; 4096]);
-        while !got.ends_with("Evacuate the area.") {
+        while !got.ends_with("within 48 h") {
             let count = stream.read(&mut part).unwrap();
             assert!(count > 0, "{got}");
             got += std::str::from_utf8(&part[..count]).unwrap();
@@ -177,12 +178,17 @@ fn a_push_message_has_the_priority_of_the_level_and_a_server_that_refuses_it_is_
         } else {
             "ended"
         };
-        let title = format!("Title: [{}] Monte Toc: {} {state}\r\n", said.2, said.0);
-        for part in [
-            title.as_str(),
-            priority,
-            "\r\n\r\n5Bcc: all@example.org, 2017-06-06T17:00:00Z; collapse forecast (median) 2017",
-        ] {
+        let (mark, level) = (
+            if said.2 == "Test" { "TEST: " } else { "" },
+            said.0.to_uppercase(),
+        );
+        let title = format!("Title: {mark}{level} {state}: Monte Toc, 5Bcc: all@example.org\r\n");
+        let text = if said.1 == "firing" {
+            "\r\n\r\nEvacuate the area. At 2017-06-06 19:00 CEST; collapse forecast (median) 2017-06-07 05:00 CEST; benchmark 5"
+        } else {
+            "\r\n\r\nThis is no all-clear: somebody has to look at the slope before anyone goes back. At 2017-06-06 19:00 CEST; benchmark 5"
+        };
+        for part in [title.as_str(), priority, text] {
             assert!(got.contains(part), "{part}: {got}");
         }
     }
@@ -279,8 +285,8 @@ fn a_text_message_goes_to_each_number_and_a_modem_that_refuses_is_a_failure() {
     let output = run("sms.py", &[device, "+391", "+392"], RED, &[]);
     assert!(output.status.success(), "{output:?}");
     drop(held);
-    let text = "RED: Monte Toc, 5 Bcc: all@example.org. EVACUATE by the plan. Collapse forecast 2017-06-07 03:00 UTC. \
-                At 2017-06-06 17:00 UTC: chance of collapse 57 %";
+    let text = "RED: Monte Toc, 5 Bcc: all@example.org. EVACUATE by the plan. Collapse forecast 2017-06-07 05:00 CEST. \
+                At 2017-06-06 19:00 CEST: chance of collapse";
     assert_eq!(
         got.join().unwrap(),
         [

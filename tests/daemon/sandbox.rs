@@ -33,6 +33,7 @@ fn limited(folder: &Path, run: &[&str]) -> HookConfig {
     HookConfig {
         extra: ExtraMessages::default(),
         links: None,
+        zone: "UTC".to_owned(),
         site: false,
         to: None,
         escalate_after: None,

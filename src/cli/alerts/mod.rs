@@ -64,7 +64,7 @@ enum Action {
     },
     /// Say everything about one alert: what called it, what it recommends, who got it, who has seen it
     Show(show::ShowArgs),
-    /// Somebody has seen what is in force: hooks that have not taken it are not tried again
+    /// Acknowledge the alerts in force: hooks that have not taken them are not tried again
     Ack {
         /// Where; default is everywhere
         #[arg(long, value_name = "ID")]

@@ -199,6 +199,7 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
     Ok(HookConfig {
         extra: ExtraMessages::default(),
         links: None,
+        zone: "UTC".to_owned(),
         site: false,
         to: None,
         escalate_after: None,

@@ -53,6 +53,8 @@ struct DemoMoment {
     /// What red is called by; `None` in states of older versions.
     red: Option<LevelChance>,
     within_outlook: f64,
+    /// Of a collapse within 30 days, as it is reported.
+    reported: Option<f64>,
     failure: FailureTime,
     level: Level,
 }
@@ -101,6 +103,7 @@ impl Timeline {
             velocity_mm_per_day,
             chance_within_evacuation_time,
             chance_within_outlook,
+            chances_of_collapse,
             called,
             ..
         } = &event.kind
@@ -112,6 +115,9 @@ impl Timeline {
                 within_evacuation: *chance_within_evacuation_time,
                 red: called.as_ref().map(|called| called.red),
                 within_outlook: *chance_within_outlook,
+                reported: chances_of_collapse
+                    .as_deref()
+                    .map(|chances| chances.within_30_days),
                 failure: *failure_time,
                 level: record.level.unwrap_or(Level::Green),
             });
@@ -270,6 +276,10 @@ fn reason(rule: &str, moment: Option<&DemoMoment>) -> String {
             let chance = percent_in_words(moment.within_outlook);
             format!("{chance} in 30 days{median}")
         }
+        "reported-chance" => {
+            let chance = moment.reported.map_or_else(String::new, percent_in_words);
+            format!("{chance} in 30 days; levels count less")
+        }
         "chance-within-evacuation-time" => {
             let (chance, span) = moment.red.map_or_else(
                 || (moment.within_evacuation, "time".to_owned()),
@@ -288,7 +298,6 @@ fn words(rule: &str) -> String {
         "critical-velocity" => "faster than the critical 1 m/day",
         "decelerated" => "it has slowed down",
         "steady" | "quiet" => "steady for long enough",
-        "reported-chance" => "a collapse is likely, though little shows yet",
         "regime-flip" => "an unstable acceleration has begun",
         "intercept-drifting-in" => "the forecast date moves nearer",
         "transition-drifting-in" => "the inflection of the velocity moves nearer",

@@ -3,7 +3,7 @@
 use super::sentence::{brief, tail_probability};
 use crate::alert::percent_in_words;
 use crate::cli::table::{TextTable, time};
-use crate::effects::{Change, Effect, Explanation, Form};
+use crate::effects::{Change, EXPLAINED_DAYS, Effect, Explanation, Form};
 use crate::reading::Timestamp;
 
 /// A table under its heading.
@@ -98,12 +98,13 @@ fn percent_change(change: Change) -> String {
 fn forecast(explanation: &Explanation) -> TextTable {
     let forecast = &explanation.forecast;
     let mut table = TextTable::headed(["", "before", "after"]);
-    let shares = [
+    let within = format!("chance of failure within {EXPLAINED_DAYS:.0} days");
+    let shares: [(&str, _); 2] = [
         (
             "probability that it is unstable (m > 1)",
             forecast.probability_unstable,
         ),
-        ("chance of failure", forecast.probability_of_failure),
+        (&within, forecast.probability_of_failure),
     ];
     for (name, change) in shares {
         table.row([

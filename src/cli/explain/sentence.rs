@@ -66,7 +66,8 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
     if !explanation.verdict.effect.is_an_end() {
         said.push(match explanation.explained {
             Explained::Full => {
-                "Explained in full: the residual that is left passes for noise.".to_owned()
+                "Explained in full: the residual that is left cannot be distinguished from noise."
+                    .to_owned()
             }
             Explained::Partly if is_slow_alike => format!(
                 "Explained in part: a load that nothing measures would explain as much{left}."

@@ -139,9 +139,9 @@ mod tests {
             explained: Explained::Full,
             ..lake()
         };
-        assert!(
-            text(&full).contains("Explained in full: the residual that is left passes for noise.")
-        );
+        assert!(text(&full).contains(
+            "Explained in full: the residual that is left cannot be distinguished from noise."
+        ));
     }
 
     #[test]

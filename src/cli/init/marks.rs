@@ -1,4 +1,4 @@
-//! What stands before the decimals of a table and between its thousands, judged column by column: those of readings first.
+//! The decimal mark of a table and the mark between its thousands, judged column by column: those of readings first.
 
 use super::times;
 use crate::cli::args::DialectArgs;
@@ -227,7 +227,7 @@ fn verdict_of(columns: &[&Vec<String>]) -> MarkVerdict {
     }
 }
 
-/// What stands before the decimals of a table, or which flag decides it; `is_reading`: what a column's name or a flag says.
+/// The decimal mark of a table, or which flag decides it; `is_reading`: what a column's name or a flag says.
 pub(super) fn decimal(
     survey: &Survey,
     stated: &DialectArgs,

@@ -402,7 +402,7 @@ fn written(
         if written.needs_zone && !has_zone && written.zone.is_none() {
             return Err(vec![
                 "its times state no offset: give --time-zone with the zone of the logger's clock, such as Europe/Rome \
-                 or UTC (and --dst standard for a clock that is never put forward)"
+                 or UTC (and --dst standard for a clock without summer time)"
                     .to_owned(),
             ]);
         }

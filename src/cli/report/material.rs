@@ -6,6 +6,7 @@ use crate::cli::{replay, text};
 use crate::config;
 use crate::monitor::{Event, Settings, by_time};
 use crate::reading::{BenchmarkId, Channel, Recording, Sample, Series, TimeSpan, Timestamp};
+use crate::runtime::clock;
 use crate::store::{EARLIEST, LATEST, MOST_SHOWN, Store, Values};
 use anyhow::Context;
 use jiff::tz::TimeZone;
@@ -26,7 +27,8 @@ pub(super) struct Material {
     pub(super) events: Vec<Event>,
     /// Events before this are not listed, and hours before it not counted.
     pub(super) listed_from: Timestamp,
-    /// Of a state: its newest reading; benchmarks may have fallen silent before. Of files each series ends where it does.
+    /// Of a state: its newest reading, or now while a daemon works on it; benchmarks may have fallen silent before. Of files each series ends
+    /// where it does.
     pub(super) until: Option<Timestamp>,
     /// By which it judged.
     pub(super) policy: Policy,
@@ -54,7 +56,8 @@ impl Material {
         let from = match (self.until, self.events.first()) {
             // The readings of a state may be drawn from later on.
             (Some(_), Some(event)) => first.map_or(event.time, |first| first.min(event.time)),
-            (Some(_) | None, _) => first.unwrap_or(to),
+            (Some(_), None) => first.unwrap_or(self.listed_from),
+            (None, _) => first.unwrap_or(to),
         };
         TimeSpan::new(from.min(to), to)
     }
@@ -161,7 +164,11 @@ pub(super) fn of_state(args: &Args, file: &Path) -> anyhow::Result<Material> {
         recording,
         events: events(&store)?,
         listed_from,
-        until: Some(end),
+        until: Some(if Store::is_held(folder) {
+            clock::now().max(end)
+        } else {
+            end
+        }),
         policy: config.settings.policy.clone(),
         zone: config.site.time_zone.clone(),
         sources: vec![

@@ -9,6 +9,7 @@ use crate::figures::{self, Replayed};
 use crate::monitor::{Event, EventKind, FailureTime, levels_in};
 use crate::plot::escaped;
 use crate::reading::{Series, Timestamp, counted, days_since, figure};
+use crate::store::EARLIEST;
 use std::fmt::Write as _;
 
 /// Events that are listed, the newest.
@@ -30,14 +31,18 @@ pub(super) fn summary(material: &Material, series: &Series) -> String {
             material.shown(since),
             material.shown(stretch.from)
         ),
+        (Level::Green, None) if series.readings.is_empty() => "nothing is known".to_owned(),
         (level, None) => format!("{level} since {}", material.shown(since)),
     };
     let reported = material.reported(series);
     let from = (series.readings).partition_point(|reading| reading.time < reported.from);
     let mut out = match &series.readings[from..] {
+        [] if series.readings.is_empty() && material.listed_from == EARLIEST => {
+            format!("{standing}; no reading")
+        }
         [] => format!(
             "{standing}; no reading since {}",
-            material.shown(reported.from)
+            material.shown(material.listed_from)
         ),
         readings @ [first, ..] => format!(
             "{standing}; {}, {} to {}",

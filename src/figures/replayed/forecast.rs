@@ -37,7 +37,7 @@ impl Replayed<'_> {
         let first = refits.first().map_or(x.from, |refit| day(refit.time));
         let y = Axis::dates("collapse forecast", first, later.max(x.to));
         let now = vec![(x.from, x.from), (x.to, x.to)];
-        let mut marks = vec![("no time left".to_owned(), line(now, GREY, "2 3"))];
+        let mut marks = vec![("time of the forecast".to_owned(), line(now, GREY, "2 3"))];
         let spans = refits.iter().filter_map(|refit| {
             let failure = refit.failure_time;
             let high = failure.high.map_or(2.0 * y.to - y.from, day);

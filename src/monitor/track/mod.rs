@@ -127,6 +127,11 @@ impl Track {
         events
     }
 
+    /// At `time` the sensor gave something else instead of a reading.
+    pub(super) fn note_missing(&mut self, time: Timestamp) {
+        self.record.note_missing(time);
+    }
+
     fn take_one(
         &mut self,
         policy: &Policy,

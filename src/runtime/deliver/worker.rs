@@ -387,7 +387,13 @@ impl Worker {
                 self.untried += 1;
                 waiting.escalation = self.escalation(&waiting.alert);
             }
-            self.waiting.insert(turn, waiting);
+            // What was held back may be due by what the config says now.
+            let due = if waiting.is_held {
+                clock::later(Duration::ZERO)
+            } else {
+                turn.0
+            };
+            self.waiting.insert((due, turn.1), waiting);
         }
     }
 

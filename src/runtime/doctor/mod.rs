@@ -1,4 +1,4 @@
-//! Whether this machine can carry a site.
+//! Whether this machine can run a site.
 
 mod clock_sync;
 mod daemon;

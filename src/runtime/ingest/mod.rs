@@ -257,7 +257,7 @@ pub struct FilesRead {
     pub columns: Vec<String>,
 }
 
-/// Reads and joins files, each in the format of its extension; a later file stands over an earlier one.
+/// Reads and joins files, each in the format of its extension; values of a later file replace those of an earlier one.
 ///
 /// # Errors
 /// [`IngestError`] names the first thing found wrong; nothing is silently left out but MCAP

@@ -491,9 +491,8 @@ fn times(clock: &LocalClock, kind: SourceKind) -> String {
         SummerTime::Reject | SummerTime::Earlier | SummerTime::Later => "",
     };
     match (name, kind) {
-        (_, SourceKind::Mcap) => "instants".to_owned(),
+        (_, SourceKind::Mcap) | (None, SourceKind::Toa5) => "in UTC".to_owned(),
         (Some(zone), _) => format!("with an offset, or in {zone}{summer}"),
-        (None, SourceKind::Toa5) => "in UTC".to_owned(),
         (None, SourceKind::Csv | SourceKind::Ndjson) => "with an offset".to_owned(),
     }
 }

@@ -253,7 +253,7 @@ impl PreviewTrack {
             format!("the readings go over {} years: if they do not", span / 365)
         };
         Some(format!(
-            "{what}, their dates are written in another way: set time_format (--time-format)"
+            "{what}, their dates are read in another way than they are meant: see what stands as the last time above, and time_format (--time-format)"
         ))
     }
 

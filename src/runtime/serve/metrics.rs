@@ -49,7 +49,8 @@ impl Collector for Vitals {
         let levels = self
             .levels()
             .map(|(level, count)| (level.name(), count as f64));
-        let about = "Benchmarks at each level, all of them; unknown stands beside another level";
+        let about =
+            "Benchmarks at each level, all of them; unknown stands beside a level above green";
         sheet.gauges("benchmarks", about, "level", levels)?;
         benchmarks(&mut sheet, &self.points().into_iter().collect::<Vec<_>>())
     }

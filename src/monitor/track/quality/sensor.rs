@@ -198,7 +198,7 @@ impl DataQuality {
         now: Timestamp,
         since: Timestamp,
     ) -> Vec<Event> {
-        let text = format!("benchmark {} reads again", record.benchmark());
+        let text = format!("benchmark {} gives readings again", record.benchmark());
         self.ends_unknown(record, now, since, Reason::NoData, text)
     }
 }

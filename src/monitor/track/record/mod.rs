@@ -151,6 +151,11 @@ impl BenchmarkRecord {
         self.history.range_end = range_end;
     }
 
+    /// At `time` the sensor gave something else instead of a reading.
+    pub(super) fn note_missing(&mut self, time: Timestamp) {
+        self.silence.note_missing(time);
+    }
+
     /// Whether the benchmark gives no readings.
     pub(super) fn is_silent(&self) -> bool {
         self.silence.is_silent()

@@ -62,7 +62,7 @@ export class BenchmarkPage {
     const tools = el('div', { class: 'tools', role: 'toolbar', 'aria-label': 'Stretch of time' },
       SPANS.map(([length, text]) => el('button', { type: 'button', onclick: () => this.near(length) }, text)),
       el('button', { type: 'button', class: 'finger', 'aria-pressed': 'false', onclick: (event) => this.brush(event.currentTarget) }, 'Drag to zoom'),
-      [['Earlier', -0.5, 1], ['Later', 0.5, 1], ['Nearer', 0, 0.5], ['Wider', 0, 2]].map(([text, shift, factor]) =>
+      [['Earlier', -0.5, 1], ['Later', 0.5, 1], ['Zoom in', 0, 0.5], ['Zoom out', 0, 2]].map(([text, shift, factor]) =>
         el('button', { type: 'button', onclick: () => this.move(shift, factor) }, text)));
     this.view.replaceChildren(this.headNode,
       el('section', { class: 'card', 'aria-label': 'How it stands' }, this.factsNode, this.giveNode),

@@ -367,7 +367,7 @@ function forecasts(view) {
   const made = view.forecasts.map((one) => seconds(one.time));
   const median = view.forecasts.map((one) => (one.failure_time.median ? seconds(one.failure_time.median) : null));
   return {
-    key: 'forecast', title: 'Collapse forecast, against when it was', height: 190,
+    key: 'forecast', title: 'Collapse forecast, against when it was made', height: 190,
     data: [made, median],
     range: (min, max, all) => {
       const [from, to] = all.range();
@@ -376,7 +376,7 @@ function forecasts(view) {
     values: (plot, ticks) => ticks.map((t) => dateWord(t, plot.scales.y.max - plot.scales.y.min)),
     splits: (plot, axis, min, max) => dates(min, max, 4),
     series: (shades) => [{ stroke: shades.accent, width: 0, paths: () => null, points: { show: true, size: 5, fill: shades.accent } }],
-    keys: (shades) => [['median', shades.accent], ['5 to 95 %', shades.accent, '', shades.fill], ['no time left', shades.soft, 'dotted'], ...(view.collapse ? [['what happened', shades.ink]] : [])],
+    keys: (shades) => [['median', shades.accent], ['5 to 95 %', shades.accent, '', shades.fill], ['time of the forecast', shades.soft, 'dotted'], ...(view.collapse ? [['what happened', shades.ink]] : [])],
     value: (index) => {
       const { failure_time: failure } = view.forecasts[index];
       const word = (time) => (time ? minute(time) : 'later');

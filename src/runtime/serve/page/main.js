@@ -155,7 +155,7 @@ function changed() {
 /** Lets a person give an order. */
 function orders(kind, benchmark) {
   const means = {
-    acknowledge: 'Somebody has seen what is in force: hooks that have not taken it are not tried again.',
+    acknowledge: 'Somebody has seen the alerts in force: hooks that have not taken them are not tried again.',
     shelve: 'The level in force, and lower ones, are not sent until then. A higher one is, at once.',
     silence: 'Nobody is notified until then, not of red either. What is in force at the end is sent then.',
     resolve: 'The level in force ends, because people know why it was called and that it is over. The next reading that calls for it calls it again.',

@@ -30,15 +30,18 @@ export class SitePage {
     const sorted = [...site.benchmarks].sort((a, b) => rank(b) - rank(a)
       || (b.chance_within_evacuation_time ?? 0) - (a.chance_within_evacuation_time ?? 0)
       || a.benchmark.localeCompare(b.benchmark, 'en', { numeric: true }));
+    // What people are asked to do stands first: a telephone shows no more.
+    const force = el('section', { class: 'card' }, el('h2', {}, 'In force'), this.force(site, at));
+    const isFirst = site.alerts.some((one) => one.benchmark);
     const scrolled = this.view.querySelector('ul.log')?.scrollTop ?? 0;
     this.view.replaceChildren(
       this.head(site),
       ...(at ? [] : HEALTH.filter(([is]) => is(status)).map(([, text]) => el('p', { class: 'card level red' }, text))),
       ...(at ? [] : status.faults.map((one) => el('p', { class: 'card level red' }, one.source ? `Source ${one.source}: ` : '', one.text, ', since ', when(one.since)))),
+      isFirst ? force : '',
       el('section', { class: 'card', 'aria-label': 'Benchmarks' }, table(sorted, site)),
-      el('div', { class: sorted.some((one) => one.position) ? 'two' : '' },
-        sketch(sorted, site.positions_are),
-        el('section', { class: 'card' }, el('h2', {}, 'In force'), this.force(site, at))),
+      el('div', { class: !isFirst && sorted.some((one) => one.position) ? 'two' : '' },
+        sketch(sorted, site.positions_are), isFirst ? null : force),
       ...(at || !status.drill ? [] : [drills(status.drill)]),
       el('section', { class: 'card' }, el('h2', {}, 'Newest events'), list(site.log, 'Nothing yet.')));
     const log = this.view.querySelector('ul.log');
@@ -51,7 +54,7 @@ export class SitePage {
     const counts = ['red', 'orange', 'yellow', 'green'].map((level) => [count(level), level]);
     counts.push([unknown, 'unknown']);
     const text = counts.filter(([n]) => n > 0).map(([n, level]) => `${n} ${level}`).join(', ');
-    return el('div', { class: 'head' }, el('h1', {}, site.site), badge(site.level, 'big'),
+    return el('div', { class: 'head' }, el('h1', {}, site.site), site.level === 'green' && site.unknown_since ? null : badge(site.level, 'big'),
       site.unknown_since ? [badge('unknown', 'big'), el('span', {}, 'unknown since ', when(site.unknown_since))] : null,
       el('span', { class: 'soft' }, `${site.benchmarks.length} benchmark${site.benchmarks.length === 1 ? '' : 's'}: ${text || 'none yet'}`));
   }
@@ -66,7 +69,7 @@ export class SitePage {
       const advised = own || (alert.level === 'unknown' && standing?.level === 'green');
       return el('li', {}, badge(alert.level), ' ', el('a', { href: place(alert.benchmark) }, alert.benchmark), ' since ', when(own?.since ?? alert.time),
         advised ? el('div', {}, el('strong', {}, standing.recommended)) : null,
-        el('div', {}, ...local(alert.text)),
+        el('div', {}, 'When it was called: ', ...local(alert.text)),
         seen ? el('div', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'} at `, when(seen.given_at ?? seen.time)) : null);
     });
     const quiet = site.silences.map((one) => el('li', {}, `${one.benchmark ?? 'the whole site'}: ${described(one)}`));

@@ -111,7 +111,7 @@ fn section(out: &mut String, one: &ExplainedSubject) {
     let mut rivals = explanation.cannot_separate_from.iter();
     let is_one_channel = rivals.all(|rival| rival.channel.is_none());
     let explained = match explanation.explained {
-        Explained::Full => "the residual that is left passes for noise",
+        Explained::Full => "the residual that is left cannot be distinguished from noise",
         Explained::Partly if is_one_channel => "in part: structure is left in the residual",
         Explained::Partly => "in part: which channel acts cannot be distinguished",
         Explained::None => "no effect was accepted",
