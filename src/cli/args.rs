@@ -110,7 +110,7 @@ pub struct DialectArgs {
     /// What parts the thousands of numbers: comma, point, blank or apostrophe [default: nothing]
     #[arg(long, value_name = "MARK", value_parser = ThousandsMark::parse)]
     pub thousands: Option<ThousandsMark>,
-    /// The column that gives the time; twice where date and time stand in two [default: time or t_days]
+    /// The column that gives the time; once for each where it stands in several, as date and time do [default: time or t_days]
     #[arg(long = "time-column", value_name = "NAME")]
     pub time_columns: Vec<String>,
     /// How times are written: a pattern such as "%d.%m.%Y %H:%M", rfc3339, unix, unix_ms, excel or mjd

@@ -188,7 +188,8 @@ fn covariate_line(text: &mut String, covariate: &CovariateView) {
     let kind = match (kind, is_stated) {
         (_, true) => format!("; {kind}, as the config states"),
         (CovariateKind::Other, false) => {
-            "; what it measures its name does not say: state it in [[covariate]]".to_owned()
+            "; no sensor that is monitored; what it measures its name does not say: state it in [[covariate]], or in --column if it is a sensor of motion"
+                .to_owned()
         }
         (_, false) => format!("; {kind}"),
     };

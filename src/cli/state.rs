@@ -71,7 +71,7 @@ pub(super) struct EventsArgs {
 
 /// Copy a site's state to a file, beside a running daemon
 ///
-/// To restore it, stop the daemon and put the copy in the state folder as slipwatch.db, without slipwatch.db-wal.
+/// To restore it, stop the daemon and put the copy in the state folder as slipwatch.db, without slipwatch.db-wal and slipwatch.db-shm.
 #[derive(Debug, clap::Args)]
 pub(super) struct BackupArgs {
     /// Where to; there must be no such file yet

@@ -304,7 +304,7 @@ fn check_shows_what_each_covariate_is_and_which_stated_one_is_in_no_file() {
     for part in [
         "covariate Nied_1h (logger): 20 values, 2017-06-01T00:00:00Z to 2017-06-01T19:00:00Z; rain, as the config states\n",
         "covariate river_m3_s (logger): 20 values, m3_s, 2017-06-01T00:00:00Z to 2017-06-01T19:00:00Z; flow\n",
-        "covariate box (logger): 20 values, 2017-06-01T00:00:00Z to 2017-06-01T19:00:00Z; what it measures its name does not say: state it in [[covariate]]\n",
+        "covariate box (logger): 20 values, 2017-06-01T00:00:00Z to 2017-06-01T19:00:00Z; no sensor that is monitored; what it measures its name does not say: state it in [[covariate]], or in --column if it is a sensor of motion\n",
     ] {
         assert!(out.contains(part), "no {part:?} in {out}");
     }

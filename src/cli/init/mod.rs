@@ -38,7 +38,7 @@ use std::path::{Path, PathBuf};
 /// Nothing is guessed: what the files leave open is said with the flag that decides it, and nothing is written then.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Files of readings as the logger writes them: CSV, NDJSON, TOA5 or MCAP by the name's ending
+    /// Files of readings as the logger writes them: CSV (.csv, .tsv, .txt), NDJSON (.ndjson, .jsonl), TOA5 (.dat), each also packed (.gz), or MCAP
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// The config to write

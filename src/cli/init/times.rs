@@ -198,8 +198,8 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
             [*date, *time].into_iter().chain(half).collect(),
         )),
         ([], _) => Err(format!(
-            "no column gives a time that is known; the header has {}: give --time-column NAME (twice where date and \
-             time stand in two), and --time-format, such as \"%d.%m.%Y %H:%M\", in which a word such as CET stands as it does in the cells, with \
+            "no column gives a time that is known; the header has {}: give --time-column NAME (once for each column where date and \
+             time stand in several), and --time-format, such as \"%d.%m.%Y %H:%M\", in which a word such as CET stands as it does in the cells, with \
              --time-zone; where other lines stand before the header, --skip-lines COUNT",
             with_first_cells(survey)
         )),
