@@ -29,7 +29,10 @@ resolved) state=ended ;;
 *) state=corrected ;;
 esac
 # 2017-06-06 19:00 CEST of 2017-06-06T17:00:00Z, by the clocks at the site.
-at_the_site() { TZ=${SLIPWATCH_TIME_ZONE:-UTC} date -d "$1" '+%Y-%m-%d %H:%M %Z' 2>/dev/null || printf '%s' "$1"; }
+# Where this machine does not know the zone, in UTC.
+zone=${SLIPWATCH_TIME_ZONE:-UTC}
+[ -e "/usr/share/zoneinfo/$zone" ] || zone=UTC
+at_the_site() { TZ=$zone date -d "$1" '+%Y-%m-%d %H:%M %Z' 2>/dev/null || printf '%s' "$1"; }
 # A header holds ASCII alone (RFC 2047).
 encoded() {
     case $1 in

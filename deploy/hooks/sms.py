@@ -126,8 +126,10 @@ def message(environment, alert):
     words.append(f"At {minute(environment['SLIPWATCH_TIME'], zone)}{': ' if figures else ''}{figures}")
     text = plain(" ".join(words))
     if len(text) > LONGEST:
-        # Not within a word: half a figure is another figure.
-        text = text[: LONGEST + 1].rpartition(" ")[0]
+        # After a figure that is whole, or a word: half a figure is another figure.
+        whole = text[: LONGEST + 1]
+        figure, word = whole.rfind("; "), whole.rfind(" ")
+        text = text[: figure if figure > LONGEST // 2 else word if word > LONGEST // 2 else LONGEST]
     return text.rstrip(" ;,")
 
 

@@ -23,6 +23,8 @@ const BATCHES: usize = 3;
 const IN_TIME: u8 = 6;
 /// A benchmark with a single reading is called silent after this time: it may be one that is read once a week.
 const FIRST: SignedDuration = SignedDuration::from_hours(8 * 24);
+/// One that shares its table with others may be read once a day, with nothing between.
+const A_DAY: SignedDuration = SignedDuration::from_hours(25);
 /// No benchmark is called silent within this time.
 const LEAST: SignedDuration = SignedDuration::from_mins(30);
 
@@ -311,7 +313,7 @@ impl Silence {
         let allowed = match longest {
             // Where the next one was due the sensor has shown.
             None => (self.missing.and_then(|after| after.checked_mul(MAY_SKIP)))
-                .map_or(FIRST, |allowed| allowed.min(FIRST)),
+                .map_or(FIRST, |allowed| allowed.clamp(A_DAY, FIRST)),
             // Two or three readings say little of how often there are some.
             Some(longest) if self.spacings.len() < 3 => longest.checked_mul(MAY_SKIP)?,
             // The longest gap seen lately is no silence either.
@@ -395,14 +397,19 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_that_gives_one_reading_and_then_none_is_silent_after_a_few_of_its_intervals() {
+    fn a_sensor_that_gives_one_reading_and_then_none_is_silent_after_a_few_of_its_intervals_or_a_day()
+     {
         let mut silence = Silence::default();
         silence.note_missing(at(0.0));
         silence.broken_by(at(0.0));
         assert_eq!(silence.deadline(), Some(at(8.0 * 24.0)));
-        silence.note_missing(at(1.0));
-        silence.note_missing(at(2.0));
-        assert_eq!(silence.deadline(), Some(at(4.0)));
+        silence.note_missing(at(12.0));
+        silence.note_missing(at(13.0));
+        assert_eq!(silence.deadline(), Some(at(48.0)));
+        let mut hourly = Silence::default();
+        hourly.broken_by(at(0.0));
+        hourly.note_missing(at(1.0));
+        assert_eq!(hourly.deadline(), Some(at(25.0)));
     }
 
     #[test]

@@ -191,6 +191,7 @@ pub async fn follow(
                     faults.lasts(refused.clone(), &what);
                     tracing::error!(source, topic, ?RECONNECT, "the broker refuses the subscription: nothing comes from it");
                     // Asked again after a while: its rules may be others then.
+                    connection.is_ended_by_us();
                     session.disconnect();
                     if !waits(RECONNECT.1, &mut shutdown).await {
                         return;
@@ -275,7 +276,7 @@ fn possible_gap(source: &str) -> ReceivedMessage {
         "the broker has not kept the session: messages may be missing"
     );
     let text = format!(
-        "source {source}: the broker has not kept the session of this daemon; what was sent while there was no connection may be missing"
+        "source {source}: the broker has not kept the session of this daemon, or is another one than before; what was sent while there was no connection may be missing"
     );
     unreceived(source, text)
 }

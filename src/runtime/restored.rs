@@ -21,7 +21,6 @@ pub(super) fn offer_again(store: &Store) -> Result<bool, StoreError> {
     }
     let in_force = keys_in_force(store)?;
     store.offer_again(&|body| is_over(body, &in_force))?;
-    store.is_at_work()?;
     tracing::warn!("{TEXT}");
     Ok(true)
 }

@@ -100,10 +100,7 @@ pub async fn run(
     let mut daemon = Daemon::new(config, store, site, sources, reporting, clock::now);
     daemon.beside = Some(beside);
     daemon.note_inherited(config).map_err(fail)?;
-    if is_restored {
-        let reported = daemon.report("state-restored", restored::TEXT.to_owned());
-        reported.map_err(fail)?;
-    }
+    daemon.note_restored(is_restored).map_err(fail)?;
     tracing::info!(site = config.site.name, state = %config.site.state_dir.display(), "started");
     let worked = daemon.work(shutdown, hangup, progress).await;
     let Daemon {

@@ -35,9 +35,11 @@ pub struct Sources {
     /// What has been taken and is not durable yet.
     unacknowledged: Vec<Receipt>,
     /// Held, so that without a broker the other end waits.
-    _messages: mpsc::Sender<ReceivedMessage>,
+    messages: mpsc::Sender<ReceivedMessage>,
     /// Of each broker, by its source; and since when they are followed.
     subscriptions: Vec<(String, Subscription)>,
+    /// Sources of brokers that the config does not have any more, and the state still has.
+    gone: Vec<String>,
     started: Stopwatch,
     /// Stops them, also when it is dropped.
     stop: Trigger,
@@ -54,13 +56,17 @@ impl Sources {
         faults.forget_sources();
         let (messages, deliveries) = mpsc::channel(MESSAGES);
         let (stop, stopped) = shutdown::pair();
-        let subscriptions = listen(config, store, &messages, &stopped, faults)?;
         let follower = Follower::new(&config.sources, &config.benchmarks, &store.positions()?);
         let (sender, batches) = mpsc::channel(BATCHES);
-        let task = tokio::spawn(tail::follow(follower, sender, faults.clone(), stopped));
+        let task = tokio::spawn(tail::follow(
+            follower,
+            sender,
+            faults.clone(),
+            stopped.clone(),
+        ));
         let mut sources = Self::of(messages, deliveries, stop);
         (sources.batches, sources.task) = (batches, task);
-        sources.subscriptions = subscriptions;
+        sources.listen(config, store, faults, &stopped)?;
         Ok(sources)
     }
 
@@ -75,8 +81,9 @@ impl Sources {
             batches,
             deliveries,
             unacknowledged: Vec::new(),
-            _messages: messages,
+            messages,
             subscriptions: Vec::new(),
+            gone: Vec::new(),
             started: Stopwatch::start(),
             stop,
             task: tokio::spawn(async { Ok(()) }),
@@ -96,6 +103,10 @@ impl Sources {
                 store.note_broker_session(source, &one.client)?;
                 one.is_known = true;
             }
+        }
+        while let Some(source) = self.gone.last() {
+            store.forget_broker_session(source)?;
+            self.gone.pop();
         }
         Ok(())
     }
@@ -155,50 +166,45 @@ impl Sources {
             }
         });
     }
-}
 
-/// Follows the brokers; the subscription with each.
-fn listen(
-    config: &Config,
-    store: &Store,
-    messages: &mpsc::Sender<ReceivedMessage>,
-    stopped: &Shutdown,
-    faults: &ServiceFaults,
-) -> Result<Vec<(String, Subscription)>, StoreError> {
-    let (instance, known) = (store.instance()?, store.broker_sessions()?);
-    let each = config.brokers.iter().map(|broker| {
-        // One session for each state and source, found again after a restart. Two daemons of one site's name would
-        // each get a part of the messages.
-        let fresh = || {
-            let (site, source) = (&config.site.name, &broker.id);
-            format!("slipwatch-{site}-{source}-{instance:016x}")
-        };
-        let client = known.get(&broker.id).cloned();
-        let is_known = client.is_some();
-        let subscription = Subscription::new(client.unwrap_or_else(fresh), is_known);
-        tokio::spawn(mqtt::follow(
-            broker.clone(),
-            config.benchmarks.clone(),
-            messages.clone(),
-            faults.clone(),
-            subscription.clone(),
-            stopped.clone(),
-        ));
-        (broker.id.clone(), subscription)
-    });
-    let each: Vec<(String, Subscription)> = each.collect();
-    let is_of_config = |source: &String| config.brokers.iter().any(|broker| broker.id == *source);
-    let gone = known
-        .into_iter()
-        .filter(|(source, _)| !is_of_config(source));
-    let gone: Vec<(String, String)> = gone.collect();
-    for (source, _) in &gone {
-        store.forget_broker_session(source)?;
+    /// Follows the brokers. Sources of which the state knows a session, and the config nothing, are kept until [`Sources::note_sessions`].
+    fn listen(
+        &mut self,
+        config: &Config,
+        store: &Store,
+        faults: &ServiceFaults,
+        stopped: &Shutdown,
+    ) -> Result<(), StoreError> {
+        let (instance, known) = (store.instance()?, store.broker_sessions()?);
+        for broker in &config.brokers {
+            // One session for each state and source, found again after a restart. Two daemons of one site's name would
+            // each get a part of the messages.
+            let fresh = || {
+                let (site, source) = (&config.site.name, &broker.id);
+                format!("slipwatch-{site}-{source}-{instance:016x}")
+            };
+            let client = known.get(&broker.id).cloned();
+            let is_known = client.is_some();
+            let subscription = Subscription::new(client.unwrap_or_else(fresh), is_known);
+            tokio::spawn(mqtt::follow(
+                broker.clone(),
+                config.benchmarks.clone(),
+                self.messages.clone(),
+                faults.clone(),
+                subscription.clone(),
+                stopped.clone(),
+            ));
+            self.subscriptions.push((broker.id.clone(), subscription));
+        }
+        let is_gone = |source: &String| config.brokers.iter().all(|broker| broker.id != *source);
+        let gone = known.into_iter().filter(|(source, _)| is_gone(source));
+        let gone: Vec<(String, String)> = gone.collect();
+        // A source that was only taken out is missed by nobody.
+        if !gone.is_empty() && self.subscriptions.iter().any(|(_, one)| !one.is_known) {
+            let (gap, messages) = (mqtt::left_with_broker(&gone), self.messages.clone());
+            tokio::spawn(async move { messages.send(gap).await.is_ok() });
+        }
+        self.gone = gone.into_iter().map(|(source, _)| source).collect();
+        Ok(())
     }
-    // A source that was only taken out is missed by nobody.
-    if !gone.is_empty() && each.iter().any(|(_, one)| !one.is_known) {
-        let (gap, messages) = (mqtt::left_with_broker(&gone), messages.clone());
-        tokio::spawn(async move { messages.send(gap).await.is_ok() });
-    }
-    Ok(each)
 }

@@ -37,6 +37,8 @@ const NAMES_OF_TIMES: [&str; 12] = [
     "time", "date", "stamp", "datum", "zeit", "heure", "fecha", "data", "epoch", "unix", "mjd",
     "julian",
 ];
+/// Those of them that are a count of days or seconds.
+const NAMES_OF_COUNTS: [&str; 4] = ["epoch", "unix", "mjd", "julian"];
 /// Columns of the header that an error shows with their first cell.
 const MOST_SHOWN: usize = 8;
 /// Cells that are no date, in a column of dates: a repeated header, a line of totals.
@@ -185,7 +187,15 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
         .iter()
         .copied()
         .filter(|at| is_dated(survey, *at, decimal));
-    let dated: Vec<usize> = dated.collect();
+    let mut dated: Vec<usize> = dated.collect();
+    // A count beside a date, of epochs say, is not what says when a row was measured.
+    let is_count = |at: &usize| {
+        let name = survey.names[*at].to_lowercase();
+        NAMES_OF_COUNTS.iter().any(|part| name.contains(part))
+    };
+    if !dated.iter().all(is_count) {
+        dated.retain(|at| !is_count(at));
+    }
     let half = half_of_day(survey);
     match (&dated[..], &of_day[..]) {
         ([date], []) => match days_alone(survey, *date, decimal) {

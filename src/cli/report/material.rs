@@ -53,7 +53,9 @@ impl Material {
         let own = series.span();
         let to = self.until.or(own.map(|own| own.to)).unwrap_or_default();
         let first = own.map(|own| own.from);
-        let from = match (self.until, self.events.first()) {
+        let events = self.events.iter();
+        let mut own_events = events.filter(|one| one.benchmark.as_ref() == Some(&series.benchmark));
+        let from = match (self.until, own_events.next()) {
             // The readings of a state may be drawn from later on.
             (Some(_), Some(event)) => first.map_or(event.time, |first| first.min(event.time)),
             (Some(_), None) => first.unwrap_or(self.listed_from),

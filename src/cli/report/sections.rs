@@ -120,11 +120,13 @@ pub(super) fn in_order(material: &Material, series: &Series) -> Option<TextTable
     let said: Vec<&Event> = material.events.iter().filter(ours).collect();
     let mut table = TextTable::headed(["time", "kind", "what"]);
     let said = &said[said.len().saturating_sub(LISTED)..];
+    let mut left_out = 0;
     for (at, event) in said.iter().enumerate() {
         let is_alike = |other: Option<&&Event>| other.is_some_and(|other| is_drift(event, other));
         if is_alike(at.checked_sub(1).and_then(|before| said.get(before)))
             && is_alike(said.get(at + 1))
         {
+            left_out += 1;
             continue;
         }
         let line = text::line(event, &material.zone);
@@ -133,7 +135,10 @@ pub(super) fn in_order(material: &Material, series: &Series) -> Option<TextTable
         table.row([
             material.shown(event.time),
             event.kind.name().to_owned(),
-            what.to_owned(),
+            match std::mem::take(&mut left_out) {
+                0 => what.to_owned(),
+                others => format!("{what} ({others} more of this kind before it)"),
+            },
         ]);
     }
     (!said.is_empty()).then_some(table)

@@ -94,11 +94,7 @@ impl Daemon {
     }
 
     /// A fault that concerns the whole site, among the events.
-    pub(in crate::runtime) fn report(
-        &mut self,
-        kind: &str,
-        text: String,
-    ) -> Result<(), StoreError> {
+    pub(super) fn report(&mut self, kind: &str, text: String) -> Result<(), StoreError> {
         let (time, kind) = ((self.host_time)(), kind.to_owned());
         let input = Input::Trouble { kind, text };
         let events = self.site.take(&Arrival { time, input }, time)?;

@@ -2,6 +2,7 @@
 
 use super::Daemon;
 use crate::alert::Level;
+use crate::runtime::restored;
 use crate::runtime::service_faults::{self, FaultPlace};
 use crate::store::StoreError;
 
@@ -26,6 +27,15 @@ impl Daemon {
             Err(error) if !error.is_full() => Err(error),
             Ok(()) | Err(_) => Ok(()),
         }
+    }
+
+    /// Where the state was put back from a backup, reports it, once.
+    pub(in crate::runtime) fn note_restored(&mut self, is_so: bool) -> Result<(), StoreError> {
+        if !is_so {
+            return Ok(());
+        }
+        self.report("state-restored", restored::TEXT.to_owned())?;
+        self.store.is_at_work()
     }
 
     fn note_quarantined(&mut self) -> Result<(), StoreError> {

@@ -21,6 +21,8 @@ pub(super) struct Connection {
     since: Option<Stopwatch>,
     /// How many in a row have ended within [`STEADY`].
     short: u32,
+    /// Whether we are ending it.
+    is_over: bool,
     /// Ends the fault once it is steady.
     settling: JoinSet<()>,
 }
@@ -35,6 +37,7 @@ impl Connection {
             client: client.to_owned(),
             since: None,
             short: 0,
+            is_over: false,
             settling: JoinSet::new(),
         }
     }
@@ -42,6 +45,7 @@ impl Connection {
     /// The broker has accepted it.
     pub(super) fn begins(&mut self) {
         self.since = Some(Stopwatch::start());
+        while self.settling.try_join_next().is_some() {}
         let (faults, place) = (self.faults.clone(), self.place.clone());
         self.settling.spawn(async move {
             tokio::time::sleep(STEADY).await;
@@ -49,9 +53,18 @@ impl Connection {
         });
     }
 
+    /// We end it ourselves: the broker has been reached.
+    pub(super) fn is_ended_by_us(&mut self) {
+        self.is_over = true;
+    }
+
     /// It has ended, or there was none.
     pub(super) fn ends(&mut self, error: &str) {
         self.settling.abort_all();
+        if std::mem::take(&mut self.is_over) {
+            self.since = None;
+            return self.faults.is_over(&self.place);
+        }
         self.short = match self.since.take() {
             Some(since) if since.elapsed() < STEADY => self.short + 1,
             Some(_) | None => 0,

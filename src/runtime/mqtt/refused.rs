@@ -2,7 +2,7 @@
 
 use crate::reading::counted;
 use crate::runtime::service_faults::{FaultPlace, ServiceFaults};
-use crate::runtime::tail::RefusedRows;
+use crate::runtime::tail::{MOST_REFUSED, RefusedRows};
 use std::collections::BTreeMap;
 use std::error::Error;
 
@@ -23,7 +23,12 @@ impl RefusedTopics {
     pub(super) fn note(&mut self, topic: &str, is_used: bool, fault: Option<&dyn Error>) {
         if !self.each.contains_key(topic) {
             if self.each.len() >= MOST_TOPICS {
-                return;
+                // One that has given a reading stays.
+                let useless = self.each.iter().find(|(_, rows)| !rows.is_below_used);
+                let Some(topic) = useless.map(|(topic, _)| topic.clone()) else {
+                    return;
+                };
+                self.each.remove(&topic);
             }
             self.each.insert(topic.to_owned(), RefusedRows::default());
         }
@@ -34,8 +39,9 @@ impl RefusedTopics {
             self.is_news |= refused.count > 0 || !refused.is_below_used;
             refused.end();
         } else if let Some(error) = fault {
-            self.is_news = true;
             refused.add(error);
+            // The count that is shown need not be the newest.
+            self.is_news |= refused.count == MOST_REFUSED || refused.count.is_power_of_two();
         }
     }
 

@@ -65,7 +65,7 @@ impl Follower {
             if let Some(file) = newest.filter(|_| total >= MOST_REFUSED) {
                 let (path, why) = (file.path.display(), &file.refused_rows.why);
                 let text = format!(
-                    "none of the newest {total} rows of the newest files could be used, as in {path}: {why}"
+                    "none of the newest {total} rows or messages of the newest files could be used, as in {path}: {why}"
                 );
                 faults.push((place, text));
             }

@@ -31,7 +31,7 @@ pub use follow::{ArrivalBatch, Follower};
 pub use known::KnownFiles;
 pub use reorder::WaitingReading;
 pub(super) use rescan::list;
-pub(super) use text::{BadLine, LinesRead, RefusedRows, TextReader};
+pub(super) use text::{BadLine, LinesRead, MOST_REFUSED, RefusedRows, TextReader};
 
 use super::clock::{self, Stopwatch};
 use super::service_faults::ServiceFaults;

@@ -45,7 +45,7 @@ pub(in crate::runtime) struct RefusedRows {
 }
 
 /// So many rows in a row that cannot be used are no accident: the table has become another one.
-pub(super) const MOST_REFUSED: u64 = 5;
+pub(in crate::runtime) const MOST_REFUSED: u64 = 5;
 
 impl RefusedRows {
     /// What is wrong with the newest, and how many there are, where that is no accident.
