@@ -29,7 +29,7 @@ import termios
 import time
 import tty
 import unicodedata
-from datetime import datetime
+from datetime import datetime, timezone
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 ANSWER_S = 20.0
@@ -93,10 +93,15 @@ def plain(text):
 def minute(time, zone):
     """2017-06-07 05:00 CEST of 2017-06-07T03:00:00Z in Europe/Rome."""
     try:
-        instant = datetime.fromisoformat(f"{time[:19]}+00:00")
-        return instant.astimezone(ZoneInfo(zone)).strftime("%Y-%m-%d %H:%M %Z")
+        clocks = ZoneInfo(zone)
     except (ValueError, ZoneInfoNotFoundError):
+        # This machine does not know the zone.
+        clocks = timezone.utc
+    try:
+        instant = datetime.fromisoformat(f"{time[:19]}+00:00")
+    except ValueError:
         return time
+    return instant.astimezone(clocks).strftime("%Y-%m-%d %H:%M %Z")
 
 
 def message(environment, alert):

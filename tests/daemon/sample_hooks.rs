@@ -13,6 +13,15 @@ use std::thread;
 /// What an alert is: its level, its state and the delivery's status.
 type Said<'a> = (&'a str, &'a str, &'a str);
 
+/// The text with its times in Europe/Rome as a hook shows them on this machine: in UTC where it knows no zones.
+fn by_clocks(text: &str) -> String {
+    if Path::new("/usr/share/zoneinfo/Europe/Rome").exists() {
+        return text.to_owned();
+    }
+    text.replace("2017-06-06 19:00 CEST", "2017-06-06 17:00 UTC")
+        .replace("2017-06-07 05:00 CEST", "2017-06-07 03:00 UTC")
+}
+
 const RED: Said<'_> = ("red", "firing", "Actual");
 
 /// Runs one with the environment and the input that the daemon gives it.
@@ -103,7 +112,7 @@ fn an_email_goes_to_each_address_with_the_alert_in_it_and_no_name_forges_a_heade
         "\nbenchmark 5: red; chance of collapse 57 % within 48 h.\n",
         r#""text": "benchmark 5: red; chance"#,
     ] {
-        assert!(body.contains(part), "{part}: {body}");
+        assert!(body.contains(&by_clocks(part)), "{part}: {body}");
     }
     let failing = program(folder.path(), "#!/bin/sh\ncat > /dev/null\nexit 75\n");
     let output = run("email.sh", &to, RED, &[("SENDMAIL", &failing)]);
@@ -189,7 +198,7 @@ fn a_push_message_has_the_priority_of_the_level_and_a_server_that_refuses_it_is_
             "\r\n\r\nThis is no all-clear: somebody has to look at the slope before anyone goes back. At 2017-06-06 19:00 CEST; benchmark 5"
         };
         for part in [title.as_str(), priority, text] {
-            assert!(got.contains(part), "{part}: {got}");
+            assert!(got.contains(&by_clocks(part)), "{part}: {got}");
         }
     }
     let (url, got) = answering("403 Forbidden");
@@ -287,6 +296,12 @@ fn a_text_message_goes_to_each_number_and_a_modem_that_refuses_is_a_failure() {
     drop(held);
     let text = "RED: Monte Toc, 5 Bcc: all@example.org. EVACUATE by the plan. Collapse forecast 2017-06-07 05:00 CEST. \
                 At 2017-06-06 19:00 CEST: chance of collapse";
+    let mut text = by_clocks(text);
+    if text.contains("UTC") {
+        // Two letters shorter: one figure more has room.
+        text += " 57%";
+    }
+    let text = text.as_str();
     assert_eq!(
         got.join().unwrap(),
         [
