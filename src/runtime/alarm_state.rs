@@ -101,7 +101,7 @@ impl Alarms {
         }
         let orders = TakenOrders::read(store, at)?;
         for one in newest.values_mut() {
-            one.is_acknowledged = orders.of(&one.event).any(|order| says_seen(&order.event));
+            one.is_acknowledged = is_seen(&orders, &one.event);
         }
         Ok(Self {
             newest,
@@ -118,7 +118,7 @@ impl Alarms {
     /// Whether nothing is known of a place, and nobody has acknowledged that.
     fn is_unseen_unknown(&self, place: Option<&BenchmarkId>) -> bool {
         let unknown = self.unknown.get(&place.cloned());
-        unknown.is_some_and(|event| !self.orders.of(event).any(|order| says_seen(&order.event)))
+        unknown.is_some_and(|event| !is_seen(&self.orders, event))
     }
 
     /// How that of a place stands, `None` of the whole site, where its newest forecast calls for `called`.
@@ -298,6 +298,11 @@ fn take(newest: &mut BTreeMap<Option<BenchmarkId>, NewestAlert>, event: Event) {
             }
         }
     }
+}
+
+/// Whether people have acknowledged this alert, or ended it.
+fn is_seen(orders: &TakenOrders, alert: &Event) -> bool {
+    orders.of(alert).any(|order| says_seen(&order.event))
 }
 
 /// Whether it says that people have seen the alerts that it is of: an acknowledgement, or that they ended them.

@@ -339,10 +339,8 @@ async fn a_site_that_is_renamed_keeps_its_session_and_a_source_that_is_renamed_i
         daemon.text("log")
     );
     daemon.restart_as("id = \"radio\"", "id = \"wireless\"");
-    let events =
-        |daemon: &Daemon| daemon.printed(&["events", "--config", "site.toml", "--format", "json"]);
     daemon.wait("what may be missing is said", |daemon| {
-        let events = events(daemon);
+        let events = daemon.events();
         events.contains("possible-gap") && events.contains("radio (client")
     });
 }

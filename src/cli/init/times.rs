@@ -33,11 +33,10 @@ const NAMES_OF_TIMES_OF_DAY: [&str; 9] = [
 /// The first cells, which exclude most candidates.
 const FIRST_CELLS: usize = 200;
 /// Parts of names of columns whose numbers may be times.
-const NAMES_OF_TIMES: [&str; 12] = [
-    "time", "date", "stamp", "datum", "zeit", "heure", "fecha", "data", "epoch", "unix", "mjd",
-    "julian",
+const NAMES_OF_TIMES: [&str; 8] = [
+    "time", "date", "stamp", "datum", "zeit", "heure", "fecha", "data",
 ];
-/// Those of them that are a count of days or seconds.
+/// The same, of counts of days or seconds.
 const NAMES_OF_COUNTS: [&str; 4] = ["epoch", "unix", "mjd", "julian"];
 /// Columns of the header that an error shows with their first cell.
 const MOST_SHOWN: usize = 8;
@@ -289,19 +288,23 @@ fn is_all_times_of_day(survey: &Survey, at: usize) -> bool {
             .all(|cell| clock::is_time_of_day(cell) || is_named && clock::may_be_time_of_day(cell))
 }
 
+/// Whether a name in lower case is one of numbers that may be times.
+fn may_name_times(name: &str) -> bool {
+    let mut parts = NAMES_OF_TIMES.iter().chain(&NAMES_OF_COUNTS);
+    parts.any(|part| name.contains(part))
+}
+
 /// Whether the numbers of a column may be times, by its name.
 pub(super) fn may_be_time(survey: &Survey, at: usize) -> bool {
     let name = survey.names[at].to_lowercase();
-    NAMES_OF_TIMES.iter().any(|part| name.contains(part))
-        || name == "t_days"
-        || is_all_times_of_day(survey, at)
+    may_name_times(&name) || name == "t_days" || is_all_times_of_day(survey, at)
 }
 
 /// Whether a column holds dates: numbers only where its name says that too.
 fn is_dated(survey: &Survey, at: usize, decimal: DecimalMark) -> bool {
     let cells = joined(survey, &[at]);
     let name = survey.names[at].to_lowercase();
-    let may_be_numbers = NAMES_OF_TIMES.iter().any(|part| name.contains(part));
+    let may_be_numbers = may_name_times(&name);
     let is_number = |cell: &String| reader(decimal, TimeFormat::Rfc3339).number(cell).is_some();
     if cells.iter().take(FIRST_CELLS).any(is_number) {
         return may_be_numbers && of_numbers(&cells, decimal).is_some();

@@ -136,6 +136,13 @@ mod tests {
     use std::fs;
     use std::io::Write;
 
+    fn only(faults: &[(FaultPlace, String)]) -> &(FaultPlace, String) {
+        let [fault] = faults else {
+            panic!("{faults:?}");
+        };
+        fault
+    }
+
     /// A follower of `*.csv` in a folder.
     fn follower(folder: &Path) -> Follower {
         follower_from(folder, &[])
@@ -176,9 +183,7 @@ mod tests {
         };
         assert!(faults(Duration::from_secs(59)).await.is_empty());
         let lasting = faults(Duration::from_secs(2)).await;
-        let [(place, text)] = &lasting[..] else {
-            panic!("{lasting:?}");
-        };
+        let (place, text) = only(&lasting);
         assert_eq!(place.kind, ServiceFaultKind::RowUnended);
         assert!(
             text.contains("5.csv is not taken (so are those of 1 other file)"),
@@ -263,9 +268,7 @@ mod tests {
         assert!(faults("2026-01-01T00:00:00Z,1.0\n").is_empty());
         assert!(faults(&"2026-01-01T01:00:00Z;1.1\n".repeat(4)).is_empty());
         let lasting = faults("2026-01-01T01:00:00Z;1.1\n");
-        let [(place, text)] = &lasting[..] else {
-            panic!("{lasting:?}");
-        };
+        let (place, text) = only(&lasting);
         assert_eq!(place.kind, ServiceFaultKind::RowsRefused);
         assert!(text.contains("none of the newest 5 rows"), "{text}");
         assert!(faults("2026-01-01T01:00:00Z,1.1\n").is_empty());
@@ -298,9 +301,7 @@ mod tests {
         let mut grown = fs::OpenOptions::new().append(true).open(&file).unwrap();
         grown.write_all(&recording).unwrap();
         let lasting = faults();
-        let [(place, text)] = &lasting[..] else {
-            panic!("{lasting:?}");
-        };
+        let (place, text) = only(&lasting);
         assert_eq!(place.kind, ServiceFaultKind::FileRefused);
         let count = format!("{} bytes stand behind the footer", recording.len());
         assert!(text.contains(&count), "{text}");
@@ -337,9 +338,7 @@ mod tests {
             assert!(faults(r#"{"value": 1.0, "unit": "furlong"}"#).is_empty());
         }
         let lasting = faults(r#"{"value": 1.0, "unit": "furlong"}"#);
-        let [(place, text)] = &lasting[..] else {
-            panic!("{lasting:?}");
-        };
+        let (place, text) = only(&lasting);
         assert_eq!(place.kind, ServiceFaultKind::RowsRefused);
         assert!(
             text.contains("newest 5 messages") && text.contains("furlong"),
@@ -365,9 +364,7 @@ mod tests {
             assert!(faults(hour, "2026-01-01T01:00:00Z;1.1").is_empty());
         }
         let lasting = faults(5, "2026-01-01T01:00:00Z;1.1");
-        let [(place, text)] = &lasting[..] else {
-            panic!("{lasting:?}");
-        };
+        let (place, text) = only(&lasting);
         assert_eq!(place.kind, ServiceFaultKind::RowsRefused);
         assert!(
             text.contains("newest 5 rows") && text.contains("5.csv"),
