@@ -14,7 +14,7 @@ use std::process::{Command, Stdio};
 const MEASURED: &str = "../shared/data";
 
 /// The name of a condition, and commands of which one must succeed.
-const TOOLS: [(&str, &[&[&str]]); 13] = [
+const TOOLS: [(&str, &[&[&str]]); 14] = [
     (
         "has_alertmanager",
         &[&["prometheus-alertmanager", "--version"]],
@@ -23,6 +23,7 @@ const TOOLS: [(&str, &[&[&str]]); 13] = [
         "has_cargo_deb",
         &[&["sh", "-c", "cargo-deb --version && dpkg-deb --version"]],
     ),
+    ("has_cc", &[&["cc", "--version"]]),
     // pip install axe-core-python
     ("has_axe", &[&["python3", "-c", "import axe_core_python"]]),
     ("has_curl", &[&["curl", "--version"]]),

@@ -22,6 +22,10 @@ place=$(plain "${SLIPWATCH_BENCHMARK:-(site)}")
 if [ "${SLIPWATCH_COUNT:-1}" -gt 1 ]; then
     place="$SLIPWATCH_COUNT benchmarks"
 fi
+# What is unknown ends no level.
+if [ -n "${SLIPWATCH_IN_FORCE:-}" ]; then
+    place="$place, $SLIPWATCH_IN_FORCE stays in force"
+fi
 site=$(plain "$SLIPWATCH_SITE")
 case $SLIPWATCH_STATE in
 firing) state=called ;;

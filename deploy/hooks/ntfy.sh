@@ -8,7 +8,8 @@ if [ $# -ne 1 ]; then
     exit 2
 fi
 cat >/dev/null
-case "$SLIPWATCH_LEVEL/$SLIPWATCH_STATE" in
+# What is unknown ends no level.
+case "${SLIPWATCH_IN_FORCE:-$SLIPWATCH_LEVEL}/$SLIPWATCH_STATE" in
 red/firing) priority=5 ;;
 orange/firing | unknown/firing) priority=4 ;;
 *) priority=3 ;;
@@ -43,7 +44,7 @@ case $SLIPWATCH_STATUS in
 Actual) mark= ;;
 *) mark="$(printf '%s' "$SLIPWATCH_STATUS" | tr '[:lower:]' '[:upper:]'): " ;;
 esac
-title="$mark$level $state: $(plain "$SLIPWATCH_SITE"), $place"
+title="$mark$level $state: $(plain "$SLIPWATCH_SITE"), $place${SLIPWATCH_IN_FORCE:+, $SLIPWATCH_IN_FORCE stays in force}"
 case $SLIPWATCH_LEVEL/$SLIPWATCH_STATE in
 */firing) todo=${SLIPWATCH_RECOMMENDED:-} ;;
 red/resolved | orange/resolved) todo='This is no all-clear: somebody has to look at the slope before anyone goes back.' ;;

@@ -117,7 +117,11 @@ def message(environment, alert):
     words.append(f"{level.upper()}{STATES.get(state, ' corrected')}:")
     words.append(f"{environment['SLIPWATCH_SITE']}, {place}.")
     zone = environment.get("SLIPWATCH_TIME_ZONE") or "UTC"
-    if state == "firing" and level in TO_DO:
+    in_force = environment.get("SLIPWATCH_IN_FORCE")
+    if in_force:
+        # What is unknown ends no level.
+        words.append(f"{in_force.upper()} STAYS IN FORCE: {TO_DO.get(in_force, 'watch the slope')}.")
+    elif state == "firing" and level in TO_DO:
         words.append(f"{TO_DO[level]}.")
     if state == "resolved" and level in ("red", "orange"):
         words.append("No all-clear: look at the slope first.")

@@ -31,6 +31,23 @@ impl Level {
     }
 }
 
+impl Level {
+    /// The same where the level `beside` it is in force at the benchmark: what is `unknown` ends none.
+    pub fn recommended_beside(self, beside: Option<Self>) -> &'static str {
+        match (self, beside) {
+            (Self::Unknown, Some(Self::Red)) => {
+                "RED STAYS IN FORCE: everyone stays out. The sensor may have gone with the slope: watch it by other means, from \
+                 outside the area that it can reach."
+            }
+            (Self::Unknown, Some(Self::Orange)) => {
+                "ORANGE STAYS IN FORCE, and the slope is not watched: the sensor may have gone with it. Keep the evacuation prepared, and \
+                 watch the slope by other means, from outside the area that it can reach."
+            }
+            _ => self.recommended(),
+        }
+    }
+}
+
 fn rounded(chance: f64) -> f64 {
     (1000.0 * chance).round() / 1000.0
 }

@@ -17,7 +17,7 @@ use crate::runtime::reloaded::{ConfigRefusal, sources_without_files};
 use crate::runtime::service_faults::{ServiceFault, faults_in};
 use crate::runtime::standing::{InForce, TakenOrders, closed, every, in_force};
 use crate::store::Store;
-use jiff::tz::TimeZone;
+use jiff::{SignedDuration, tz::TimeZone};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -318,6 +318,9 @@ fn suspicions(store: &Store) -> anyhow::Result<BTreeMap<BenchmarkId, Vec<String>
     Ok(all)
 }
 
+/// Of a collapse forecast within so long of the newest reading the time of the day is given too.
+const CLOCK_WITHIN: SignedDuration = SignedDuration::from_hours(72);
+
 fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     let mut table = TextTable::headed([
         "benchmark",
@@ -331,7 +334,10 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     let dash = || "-".to_owned();
     for one in &status.benchmarks {
         let velocity = one.velocity_mm_per_day;
-        let day = |time: Timestamp| time.to_zoned(zone.clone()).strftime("%Y-%m-%d").to_string();
+        let day = |time: Timestamp| match one.newest_reading {
+            Some(newest) if time <= newest + CLOCK_WITHIN => clock(time),
+            Some(_) | None => time.to_zoned(zone.clone()).strftime("%Y-%m-%d").to_string(),
+        };
         table.row([
             text::plain(one.benchmark.as_str()),
             // Since when, and why, stands below the table.
@@ -377,8 +383,8 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
         drilled(status, zone),
         recorded(status, zone),
     );
-    let legend = "collapse: median of the forecast; chance: of collapse within twice the\n\
-                  evacuation time (or red_within) of the next reading, by which red is called";
+    let legend = "collapse: median of the forecast, on the early side\nchance: of collapse within twice the evacuation time (or red_within) of the next\n\
+                  reading, by which red is called";
     let alerts = listed("in force", &status.alerts, zone)
         + &listed("ended, not acknowledged", &status.returned, zone);
     format!("{}\n{table}{legend}\n{}", folded(&head), folded(&alerts))

@@ -88,6 +88,7 @@ pub use known_load::{Filtered, KnownLoad, Part, Wave};
 pub use options::Options;
 pub use outlook::EXPLAINED_DAYS;
 pub use partition::{Partition, partition, partition_candidate};
+pub use remarks::may_be_slip;
 pub use response::MOST_SAMPLES;
 pub use rival::Rival;
 pub use together::{Together, explain_together};

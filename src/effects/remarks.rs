@@ -1,6 +1,6 @@
 //! Sentences for people on where a covariate and the velocity part ways, and on what may be slip.
 
-use super::explanation::Effect;
+use super::explanation::{Effect, Explanation};
 use super::kind::Kind;
 use crate::reading::{Channel, Quantity, Sample, Series, Timestamp, days_since};
 use jiff::SignedDuration;
@@ -30,15 +30,30 @@ pub fn of_channels(series: &Series, channels: &[Channel]) -> Vec<String> {
         .collect()
 }
 
-/// What a person should know of jumps of the reading along the motion that do not come back: slip of the slope looks the same.
+/// Jumps of the reading along the motion that do not come back, with their sizes: slip of the slope looks the same.
+fn forward_jumps<'a>(
+    effects: impl Iterator<Item = &'a Effect> + Clone,
+) -> impl Iterator<Item = (&'a Effect, f64)> {
+    let jumps = effects.filter(|one| one.effect == Kind::OFFSET);
+    let sizes: Vec<f64> = jumps.clone().filter_map(|one| one.size).collect();
+    let comes_back = move |of: f64| sizes.iter().any(|size| *size < -0.5 * of);
+    jumps.filter_map(move |one| {
+        let size = one.size.filter(|size| *size > 0.0 && !comes_back(*size))?;
+        Some((one, size))
+    })
+}
+
+/// Whether one of the effects may be slip of the slope as well as of the reading.
+pub fn may_be_slip(explanation: &Explanation) -> bool {
+    let found = std::iter::once(&explanation.verdict).chain(&explanation.also);
+    forward_jumps(found).next().is_some()
+}
+
+/// What a person should know of jumps of the reading along the motion that do not come back.
 pub(super) fn of_forward_jumps<'a>(
     effects: impl Iterator<Item = &'a Effect> + Clone,
 ) -> Vec<String> {
-    let jumps = effects.filter(|one| one.effect == Kind::OFFSET);
-    let sizes: Vec<f64> = jumps.clone().filter_map(|one| one.size).collect();
-    let comes_back = |of: f64| sizes.iter().any(|size| *size < -0.5 * of);
-    let said = jumps.filter_map(|one| {
-        let size = one.size.filter(|size| *size > 0.0 && !comes_back(*size))?;
+    let said = forward_jumps(effects).filter_map(|(one, size)| {
         Some(format!(
             "The offset of {} {} at {} is along the motion: slip of the slope within that time looks the same. A point beside it, or \
              the instrument, shows which it was.",

@@ -1,5 +1,6 @@
 //! How a table of text is written: what parts its cells, how its numbers and its times look.
 
+use super::leading_zeros::with_leading_zeros;
 use super::{LocalClock, TimeFault};
 use jiff::civil::{Date, DateTime, Time};
 use jiff::fmt::strtime::BrokenDownTime;
@@ -351,6 +352,12 @@ fn is_pattern(pattern: &str) -> bool {
 
 /// The time at which the day begins that ends at the time `text`: `2024-05-01 00:00` for `2024-05-01 24:00`.
 fn day_that_ends(text: &str) -> Option<String> {
+    // Hours from 1 to 24, and times without a colon.
+    for (end, begin) in [(" 2400", " 0000"), (" 24", " 00")] {
+        if let Some(date) = text.strip_suffix(end) {
+            return Some(format!("{date}{begin}"));
+        }
+    }
     let (date, time) = text.split_once([' ', 'T', 't'])?;
     let rest = time.trim_start().strip_prefix("24:00")?;
     let after = rest.strip_prefix(":00").unwrap_or(rest);
@@ -359,6 +366,7 @@ fn day_that_ends(text: &str) -> Option<String> {
 }
 
 fn by_pattern(pattern: &str, text: &str, clock: &LocalClock) -> Result<Timestamp, TimeFault> {
+    let text = &*with_leading_zeros(pattern, text);
     let read = BrokenDownTime::parse(pattern, text).map_err(|_| TimeFault::NotThePattern)?;
     let date = read.to_date().map_err(|_| TimeFault::NotThePattern);
     if (date.as_ref()).is_ok_and(|date| (0..FIRST_LONG_YEAR).contains(&date.year())) {

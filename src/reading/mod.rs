@@ -7,6 +7,7 @@ mod conventions;
 mod covariate;
 mod dialect;
 mod figure;
+mod leading_zeros;
 mod line_fit;
 mod median;
 mod normal;

@@ -96,7 +96,7 @@ fn entry(
         "annotations": {
             "summary": text,
             "rule": rule,
-            "recommended": alert.status.recommended(level),
+            "recommended": alert.status.marked(level.recommended_beside(alert.beside)),
             "acknowledge_url": link.unwrap_or_default(),
             "failure_time": alert.failure_time.map(|time| time.to_string()).unwrap_or_default(),
         },

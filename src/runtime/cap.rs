@@ -359,7 +359,7 @@ fn info(out: &mut String, cap: &CapFolder, alert: &Alert, level: Level, kind: Me
     let instruction = if is_over {
         "The level has ended. People look at the slope before anybody goes back."
     } else {
-        level.recommended()
+        level.recommended_beside(alert.beside)
     };
     element(out, 2, "instruction", &alert.status.marked(instruction));
     parameters(out, alert, level, rule, corrects);

@@ -60,6 +60,9 @@ pub struct Alert {
     /// The lower levels of its benchmark that it, or the level that it ends, followed on: the lowest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub earlier: Vec<EarlierLevel>,
+    /// The level in force at its benchmark, where it says that this is `unknown`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beside: Option<Level>,
     /// What it reports together, where it stands for many; none in an outbox of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub many: Option<ManyAlerts>,
@@ -82,6 +85,8 @@ pub struct HookBody<'a> {
     status: Status,
     /// What people are asked to do; null at the end of an alert.
     recommended: Option<String>,
+    /// The level in force at the benchmark beside an `unknown`, which does not end it; null where there is none.
+    level_in_force: Option<Level>,
     /// By which this alert, and no other, is acknowledged once; null where the site has no public address.
     acknowledge_url: Option<&'a str>,
     /// Which attempt this is, from 1.
@@ -139,6 +144,7 @@ impl Alert {
             failure_time,
             called: None,
             earlier: Vec::new(),
+            beside: None,
             many: None,
             status,
         })
@@ -204,10 +210,11 @@ impl Alert {
     /// What people are recommended to do; of what is over, nothing.
     fn recommended(&self) -> Option<String> {
         let is_firing = self.state == MessageState::Firing;
-        is_firing.then(|| self.status.recommended(self.level))
+        let recommended = self.level.recommended_beside(self.beside);
+        is_firing.then(|| self.status.marked(recommended))
     }
 
-    fn variables(&self, attempt: u32, link: Option<&str>) -> [(&'static str, String); 15] {
+    fn variables(&self, attempt: u32, link: Option<&str>) -> [(&'static str, String); 16] {
         let benchmark = self.event.benchmark.as_ref();
         let count = self.many.as_ref().map_or(1, |many| many.members.len());
         let optional_time = self.failure_time.map(|time| time.to_string());
@@ -228,6 +235,11 @@ impl Alert {
             ),
             ("SLIPWATCH_COUNT", count.to_string()),
             ("SLIPWATCH_LEVEL", self.level.name().to_owned()),
+            (
+                "SLIPWATCH_IN_FORCE",
+                self.beside
+                    .map_or_else(String::new, |level| level.name().to_owned()),
+            ),
             ("SLIPWATCH_STATE", state_name(self.state).to_owned()),
             ("SLIPWATCH_RULE", rule),
             ("SLIPWATCH_TEXT", text),
@@ -264,6 +276,7 @@ impl Alert {
             failure_time: self.failure_time,
             status: self.status,
             recommended: self.recommended(),
+            level_in_force: self.beside,
             acknowledge_url: link,
             attempt,
             schema_version: 1,

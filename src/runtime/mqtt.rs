@@ -15,7 +15,7 @@ use super::clock::Stopwatch;
 use super::log::is_logged;
 use super::service_faults::{FaultPlace, ServiceFaultKind, ServiceFaults};
 use super::shutdown::Shutdown;
-use super::tail::{Arrival, Decoder};
+use super::tail::{Arrival, Decoder, guarded};
 use crate::config::{Benchmark, Broker};
 use crate::monitor::Input;
 use crate::reading::Timestamp;
@@ -365,7 +365,13 @@ impl Reader {
         match (rows, text(payload)) {
             (Some(mut rows), Ok(text)) => {
                 for (line, number) in text.lines().zip(1..) {
-                    let taken = rows.take(number, line);
+                    let taken = match guarded(|| rows.take(number, line)) {
+                        Ok(taken) => taken,
+                        Err(fault) => {
+                            faults.push(fault.into());
+                            continue;
+                        }
+                    };
                     let items = taken.items.into_iter();
                     arrivals.extend(items.filter_map(|item| self.decoder.arrival(item)));
                     faults.extend(taken.fault.map(Into::into));

@@ -2,12 +2,14 @@
 
 use super::kept;
 use super::tail::{Decoder, list};
-use crate::config::Config;
+use crate::config::{Benchmark, Config, FileSource};
 use crate::reading::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::Path;
+use std::sync::mpsc;
+use std::time::Duration;
 
 /// In the state folder.
 const FILE: &str = "config.json";
@@ -33,19 +35,48 @@ impl ConfigRefusal {
     }
 }
 
-/// A line for each source of which there is no file now: its path may be mistyped.
+/// A folder that does not answer within this time is not waited for.
+const ANSWERS_WITHIN: Duration = Duration::from_secs(3);
+
+/// A line for each source of which there is no file now: its path may be mistyped; and for the first whose folder does not answer, as on a
+/// network's share whose server is away, behind which none is looked at.
 pub fn sources_without_files(config: &Config) -> Vec<String> {
-    let sources = config.sources.iter().filter_map(|source| {
-        let decoder = Decoder::new(source, &config.benchmarks);
-        let (id, pattern) = (&source.id, &source.pattern);
-        match list(pattern, &decoder) {
-            Ok((files, _)) if !files.is_empty() => None,
-            Ok(_) => Some(format!("source {id:?}: there is no file {pattern}; is the path right?")),
-            Err(error) => {
-                let folder = pattern.folder().display();
-                Some(format!("source {id:?}: the folder {folder} cannot be listed ({error}); is the path right?"))
+    let (sender, listed) = mpsc::channel();
+    let (sources, benchmarks) = (config.sources.clone(), config.benchmarks.clone());
+    // It ends when the file system answers: nobody waits for it.
+    std::thread::spawn(move || {
+        for source in &sources {
+            if sender.send(without_files(source, &benchmarks)).is_err() {
+                return;
             }
         }
     });
-    sources.collect()
+    let mut lines = Vec::new();
+    for source in &config.sources {
+        if let Ok(line) = listed.recv_timeout(ANSWERS_WITHIN) {
+            lines.extend(line);
+        } else {
+            let (id, folder) = (&source.id, source.pattern.folder().display());
+            lines.push(format!("source {id:?}: the folder {folder} does not answer (a network's share whose server is away?)"));
+            break;
+        }
+    }
+    lines
+}
+
+fn without_files(source: &FileSource, benchmarks: &[Benchmark]) -> Option<String> {
+    let decoder = Decoder::new(source, benchmarks);
+    let (id, pattern) = (&source.id, &source.pattern);
+    match list(pattern, &decoder) {
+        Ok((files, _)) if !files.is_empty() => None,
+        Ok(_) => Some(format!(
+            "source {id:?}: there is no file {pattern}; is the path right?"
+        )),
+        Err(error) => {
+            let folder = pattern.folder().display();
+            Some(format!(
+                "source {id:?}: the folder {folder} cannot be listed ({error}); is the path right?"
+            ))
+        }
+    }
 }

@@ -2,10 +2,10 @@
 
 use super::clock::Stopwatch;
 use super::mqtt::{self, Receipt, ReceivedMessage, Subscription};
-use super::service_faults::ServiceFaults;
+use super::service_faults::{FaultPlace, ServiceFaultKind, ServiceFaults};
 use super::shutdown::{self, Shutdown, Trigger};
-use super::tail::{self, ArrivalBatch, Follower};
-use crate::config::Config;
+use super::tail::{self, ArrivalBatch, FollowedFiles};
+use crate::config::{Benchmark, Broker, Config};
 use crate::store::{Store, StoreError};
 use std::collections::VecDeque;
 use std::task::{Context, Waker};
@@ -22,8 +22,49 @@ pub(super) const MESSAGES: usize = mqtt::MOST_UNACKNOWLEDGED as usize;
 /// whoever waits for room in it.
 const FEW: usize = 256;
 
+/// Between a failure of the program and the next connection to the same broker.
+const AFTER_FAILURE: Duration = Duration::from_secs(10);
+
 /// A broker that cannot be reached within this time, or does not answer, is not waited for.
 const LONGEST_SILENT: Duration = Duration::from_secs(30);
+
+/// What listening to a broker needs.
+struct Listening {
+    broker: Broker,
+    benchmarks: Vec<Benchmark>,
+    messages: mpsc::Sender<ReceivedMessage>,
+    faults: ServiceFaults,
+    subscription: Subscription,
+    stopped: Shutdown,
+}
+
+impl Listening {
+    /// Listens until it is told to stop, also where the program fails meanwhile: it then begins anew.
+    async fn keep_on(mut self) {
+        let follow = |one: &Self| {
+            tokio::spawn(mqtt::follow(
+                one.broker.clone(),
+                one.benchmarks.clone(),
+                one.messages.clone(),
+                one.faults.clone(),
+                one.subscription.clone(),
+                one.stopped.clone(),
+            ))
+        };
+        while let Err(error) = follow(&self).await {
+            let source = &self.broker.id;
+            tracing::error!(source, %error, "the program failed while it took messages, and begins anew; please report it");
+            let text =
+                "the program failed while it took messages, and begins anew: the log says where";
+            let place = FaultPlace::of_source(ServiceFaultKind::BrokerUnreachable, source);
+            self.faults.lasts(place, text);
+            tokio::select! {
+                () = tokio::time::sleep(AFTER_FAILURE) => {}
+                () = self.stopped.requested() => return,
+            }
+        }
+    }
+}
 
 /// The sources at work.
 #[derive(Debug)]
@@ -56,14 +97,9 @@ impl Sources {
         faults.forget_sources();
         let (messages, deliveries) = mpsc::channel(MESSAGES);
         let (stop, stopped) = shutdown::pair();
-        let follower = Follower::new(&config.sources, &config.benchmarks, &store.positions()?);
+        let files = FollowedFiles::new(&config.sources, &config.benchmarks, store.positions()?);
         let (sender, batches) = mpsc::channel(BATCHES);
-        let task = tokio::spawn(tail::follow(
-            follower,
-            sender,
-            faults.clone(),
-            stopped.clone(),
-        ));
+        let task = tokio::spawn(tail::follow(files, sender, faults.clone(), stopped.clone()));
         let mut sources = Self::of(messages, deliveries, stop);
         (sources.batches, sources.task) = (batches, task);
         sources.listen(config, store, faults, &stopped)?;
@@ -159,9 +195,9 @@ impl Sources {
         let receipts = std::mem::take(&mut self.unacknowledged);
         tokio::spawn(async move {
             for receipt in receipts {
+                // Those behind it may be of another broker, or of the connection after this one.
                 if receipt.acknowledge().await.is_err() {
                     tracing::debug!("the connection has gone: its messages come again");
-                    return;
                 }
             }
         });
@@ -186,14 +222,15 @@ impl Sources {
             let client = known.get(&broker.id).cloned();
             let is_known = client.is_some();
             let subscription = Subscription::new(client.unwrap_or_else(fresh), is_known);
-            tokio::spawn(mqtt::follow(
-                broker.clone(),
-                config.benchmarks.clone(),
-                self.messages.clone(),
-                faults.clone(),
-                subscription.clone(),
-                stopped.clone(),
-            ));
+            let listening = Listening {
+                broker: broker.clone(),
+                benchmarks: config.benchmarks.clone(),
+                messages: self.messages.clone(),
+                faults: faults.clone(),
+                subscription: subscription.clone(),
+                stopped: stopped.clone(),
+            };
+            tokio::spawn(listening.keep_on());
             self.subscriptions.push((broker.id.clone(), subscription));
         }
         let is_gone = |source: &String| config.brokers.iter().all(|broker| broker.id != *source);

@@ -90,8 +90,10 @@ impl Health {
     pub fn not_ready(&self) -> Option<&'static str> {
         if !self.is_caught_up {
             Some("still reading the past")
-        } else if self.is_paused || !self.is_store_writable {
+        } else if !self.is_store_writable {
             Some("the state folder cannot be written to")
+        } else if self.is_paused {
+            Some("nothing more is taken in: what came waits for room on the disk, or for the clock")
         } else if self.is_store_damaged {
             Some("the state is damaged: restore a backup")
         } else if self.is_clock_wrong {

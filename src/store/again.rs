@@ -2,7 +2,7 @@
 
 use super::outbox::{WAITING, body, standing_sum};
 use super::{Store, StoreError};
-use rusqlite::params;
+use rusqlite::{TransactionBehavior, params};
 
 impl Store {
     /// Has what was given up, or closed, wait again, as if it had never been tried, but for alerts that `is_over` by their
@@ -35,7 +35,9 @@ impl Store {
         is_over: &dyn Fn(&[u8]) -> bool,
     ) -> Result<(usize, usize), StoreError> {
         let mut inner = self.inner();
-        let transaction = inner.connection.transaction()?;
+        // It reads before it writes: begun as one that reads it would be refused where the daemon has written meanwhile.
+        let transaction =
+            (inner.connection).transaction_with_behavior(TransactionBehavior::Immediate)?;
         let (mut again, mut left_out) = (Vec::new(), 0);
         {
             let mut query = transaction.prepare(&format!(

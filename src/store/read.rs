@@ -243,13 +243,15 @@ impl Store {
         })?;
         let mut orders = Vec::new();
         for (number, body) in left {
-            let unreadable = |error: serde_json::Error| StoreError::Unreadable(error.to_string());
-            let place: OrderPlace = serde_json::from_str(&body).map_err(unreadable)?;
-            orders.push(LeftOrder {
-                number,
-                order: serde_json::from_str(&body).map_err(unreadable)?,
-                last_event: place.last_event,
-            });
+            match left_order(number, &body) {
+                Ok(order) => orders.push(order),
+                // Whoever gave it must not end the daemon by it, at each start anew.
+                Err(error) => {
+                    tracing::error!(%error, order = body, "an order that cannot be read is left out");
+                    let delete = "DELETE FROM command WHERE id = ?1";
+                    self.inner().connection.execute(delete, [number])?;
+                }
+            }
         }
         Ok(orders)
     }
@@ -385,4 +387,13 @@ pub(super) fn meta(connection: &Connection, name: &str) -> Result<Option<i64>, S
     let mut query = connection.prepare_cached("SELECT value FROM meta WHERE name = ?1")?;
     let mut rows = query.query([name])?;
     Ok(rows.next()?.map(|row| row.get(0)).transpose()?)
+}
+
+fn left_order(number: i64, body: &str) -> Result<LeftOrder, serde_json::Error> {
+    let place: OrderPlace = serde_json::from_str(body)?;
+    Ok(LeftOrder {
+        number,
+        order: serde_json::from_str(body)?,
+        last_event: place.last_event,
+    })
 }

@@ -144,7 +144,7 @@ fn init_writes_nothing_where_a_file_leaves_something_open_and_names_the_flag() {
         (
             "time,lower,upper\n2017-06-01T00:00:00Z,1,2\n",
             &[],
-            &["--column \"lower=P1:displacement:mm\"", "lower, upper"],
+            &["--column \"lower=P1:displacement:UNIT\"", "lower, upper"],
         ),
     ];
     for (text, flags, wanted) in cases {

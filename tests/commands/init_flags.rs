@@ -108,6 +108,37 @@ fn a_table_with_one_row_a_point_is_refused_with_what_to_do() {
         }
         assert!(!office.path("site.toml").exists());
     }
+    // Numbers of points that are read in turn, channels of one time, and sensors one below the other.
+    let turn = rows(60, |time, value| {
+        let hour = time.strftime("%FT%H");
+        format!("{hour}:00:00Z,101,{value}\n{hour}:20:00Z,102,{value}\n{hour}:40:00Z,103,{value}\n")
+    });
+    let channels = rows(60, |time, value| {
+        format!("{time}Z,1,{value}\n{time}Z,2,{}\n", 50.0 + value)
+    });
+    let of = |sensor: &str, minute: u32| {
+        rows(60, |time, value| {
+            format!(
+                "{}:{minute:02}:00Z,{sensor},{value}\n",
+                time.strftime("%FT%H")
+            )
+        })
+    };
+    let below = format!("{}{}", of("EX1", 0), of("EX2", 7));
+    for (name, body) in [("Prisma Nr", turn), ("wo", channels), ("Sensor", below)] {
+        let text = format!("time,{name},displacement_mm\n{body}");
+        let office = Office::with(&[("slope.csv", &text)]);
+        let said = office.refused(2, &["init", "slope.csv"]);
+        assert!(said.contains("looks like the names of points"), "{said}");
+    }
+    // Whole millimetres under the name of a sensor are readings.
+    let body = rows(60, |time, value| {
+        let whole = (value + f64::from(i32::from(time.hour()) * 7 % 5)).round();
+        format!("{time}+02:00,{whole}\n")
+    });
+    let office = Office::with(&[("slope.csv", &format!("time,Sensor 1\n{body}"))]);
+    let map = "Sensor 1=P1:displacement:mm";
+    office.done(&["init", "slope.csv", "--column", map]);
     // A column of remarks, or of the state of an instrument, names no point.
     let body = rows(60, |time, value| {
         let state = if time.hour() % 2 == 0 { "ok" } else { "weak" };
@@ -140,13 +171,13 @@ fn a_file_of_covariates_alone_goes_beside_one_with_readings() {
     // By itself it is none, and no rain is the example of a reading.
     let said = office.refused(2, &["init", "rain.csv", "--force"]);
     assert!(
-        said.contains("--column \"NAME=P1:displacement:mm\""),
+        said.contains("--column \"NAME=P1:displacement:UNIT\""),
         "{said}"
     );
     // What may be a reading is asked for.
     let said = office.refused(2, &["init", "slope.csv", "lower.csv", "--force"]);
     assert!(
-        said.contains("--column \"lower=P1:displacement:mm\""),
+        said.contains("--column \"lower=P1:displacement:UNIT\""),
         "{said}"
     );
     let stated = [

@@ -340,3 +340,69 @@ fn a_year_of_two_digits_in_front_is_read_as_such_or_asked_about() {
         assert!(said.contains("days old"), "{pattern}: {said}");
     }
 }
+
+/// As Campbell's array files have it: 115 is 01:15; and hours from 1 to 24.
+#[test]
+fn a_time_without_its_leading_zeros_is_the_one_that_was_written_and_hour_24_ends_the_day() {
+    let body: Vec<String> = (0..96)
+        .map(|quarter| {
+            let minutes = 15 * quarter;
+            let time = 100 * (minutes / 60) + minutes % 60;
+            format!("2026,61,{time},{}\n", f64::from(quarter) * 0.01)
+        })
+        .collect();
+    let text = format!("Year,Day,HHMM,Ext1_displacement_mm\n{}", body.concat());
+    let office = Office::with(&[("a.csv", &text)]);
+    let args = [
+        "init",
+        "a.csv",
+        "--time-zone",
+        "UTC",
+        "--time-column",
+        "Year",
+        "--time-column",
+        "Day",
+    ];
+    let args = [
+        &args[..],
+        &["--time-column", "HHMM", "--time-format", "%Y %j %H%M"],
+    ]
+    .concat();
+    let (exit, out, err) = office.say(&args);
+    assert_eq!(exit, 0, "{out}{err}");
+    for part in [
+        "96 readings",
+        "2026-03-02T00:00:00Z",
+        "2026-03-02T23:45:00Z",
+    ] {
+        assert!(out.contains(part), "no {part:?} in {out}{err}");
+    }
+    let body: Vec<String> = (1..=48)
+        .map(|hour| {
+            let (day, hour) = ((hour - 1) / 24 + 1, (hour - 1) % 24 + 1);
+            format!("{day:02}.03.2026,{hour},{}\n", f64::from(hour) * 0.01)
+        })
+        .collect();
+    let text = format!("Date,Hour,Ext1_displacement_mm\n{}", body.concat());
+    let office = Office::with(&[("a.csv", &text)]);
+    let args = [
+        "init",
+        "a.csv",
+        "--time-zone",
+        "UTC",
+        "--time-column",
+        "Date",
+        "--time-column",
+        "Hour",
+    ];
+    let args = [&args[..], &["--time-format", "%d.%m.%Y %H"]].concat();
+    let (exit, out, err) = office.say(&args);
+    assert_eq!(exit, 0, "{out}{err}");
+    for part in [
+        "48 readings",
+        "2026-03-01T01:00:00Z",
+        "2026-03-03T00:00:00Z",
+    ] {
+        assert!(out.contains(part), "no {part:?} in {out}{err}");
+    }
+}

@@ -492,6 +492,36 @@ async fn a_red_waits_for_no_run_of_a_lesser_alert_that_hangs() {
     assert!(dispatcher.close(Duration::ZERO).await.is_none());
 }
 
+/// As many runs for orange that hang as there are at a time, and one for the end of `unknown` at a benchmark that turns red.
+#[tokio::test]
+async fn a_red_waits_for_no_run_for_orange_or_for_the_end_of_unknown_that_hangs() {
+    let script = "echo \"$SLIPWATCH_BENCHMARK $SLIPWATCH_LEVEL $SLIPWATCH_STATE\" >> calls; [ $SLIPWATCH_LEVEL = red ] || exec sleep 600";
+    let (folder, mut config) = hook(script);
+    config.levels.push(Level::Unknown);
+    config.timeout = Duration::from_secs(900);
+    let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
+    let offer = |benchmark, level, state| {
+        assert!(dispatcher.offer(&alert_at(benchmark, level, state)));
+    };
+    let calls = || read(&folder, "calls");
+    offer("0", Level::Unknown, AlertState::Resolved);
+    eventually("the end", || calls().lines().count() == 1).await;
+    offer("0", Level::Red, AlertState::Firing);
+    eventually("the red after the end", || calls().contains("0 red")).await;
+    // The end that was broken off is tried again.
+    eventually("the end", || {
+        calls().matches("0 unknown resolved").count() == 2
+    })
+    .await;
+    for benchmark in ["1", "2", "3", "4", "5"] {
+        offer(benchmark, Level::Orange, AlertState::Firing);
+    }
+    eventually("six runs that hang", || calls().lines().count() == 8).await;
+    offer("6", Level::Red, AlertState::Firing);
+    eventually("the red of another one", || calls().contains("6 red")).await;
+    assert!(dispatcher.close(Duration::ZERO).await.is_none());
+}
+
 #[tokio::test]
 async fn what_is_superseded_while_it_waits_is_not_reported_and_a_silence_that_is_over_neither() {
     let (folder, mut config) =

@@ -36,6 +36,7 @@
 //! | 34 | a state that an earlier version wrote | `upgrade` |
 //! | 35 | orders that people give while readings come late, or a red is called | `seen` |
 //! | 36 | exports that are issued again, in any order; what a reload changes of what is called | `exports` |
+//! | 37 | file systems that do not answer | `hanging` |
 //!
 //! docs/failure-modes.md says the same for operators.
 //!
@@ -63,6 +64,7 @@ mod escalation;
 mod exports;
 mod feeds;
 mod files;
+mod hanging;
 mod killed;
 mod link;
 mod log;

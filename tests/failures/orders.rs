@@ -301,3 +301,30 @@ fn another_heartbeat_begins_with_the_config_that_names_it() {
     assert!(listeners[0].accept().is_err(), "the old one is still asked");
     program.stop();
 }
+
+/// As of another version, or written by hand.
+#[test]
+fn an_order_that_cannot_be_read_is_left_out_and_ends_no_daemon() {
+    let site = Site::new("");
+    site.append(
+        "incoming/5.csv",
+        "time,displacement_mm\n2020-01-01T00:00:00Z,1\n",
+    );
+    site.caught_up().stop();
+    let database = rusqlite::Connection::open(site.path("state/slipwatch.db")).unwrap();
+    let insert = "INSERT INTO command (body) VALUES ('{\"order\": 7}')";
+    database.execute(insert, []).unwrap();
+    let program = site.caught_up();
+    eventually("that it is reported", || {
+        site.log()
+            .contains("an order that cannot be read is left out")
+    });
+    // Orders given meanwhile are refused by the daemon, and do not end it either.
+    database.execute(insert, []).unwrap();
+    let left = || -> i64 {
+        let count = "SELECT count(*) FROM command";
+        database.query_row(count, [], |row| row.get(0)).unwrap()
+    };
+    eventually("that it is taken out", || left() == 0);
+    program.stop();
+}

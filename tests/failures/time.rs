@@ -387,3 +387,32 @@ fn an_upload_that_begins_with_its_newest_reading_is_no_logger_that_was_set_right
     let events = site.proven_events();
     assert!(!events.contains("clock-set-back"), "{events}");
 }
+
+/// As where the sensor has gone with the slope.
+#[test]
+#[cfg_attr(not(has_faketime), ignore = "libfaketime was not found by build.rs")]
+fn what_is_unknown_beside_a_red_says_that_the_red_stays() {
+    let site = Site::new(POLICY);
+    let hook = "echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> notified\n\
+                echo \"$SLIPWATCH_LEVEL $SLIPWATCH_STATE beside:$SLIPWATCH_IN_FORCE $SLIPWATCH_RECOMMENDED\" >> advice\n";
+    fs::write(site.path("hook.sh"), hook).unwrap();
+    site.append("incoming/5.csv", &format!("{HEADER}{}", failing(0..114)));
+    fs::write(site.path("ahead"), "+0").unwrap();
+    let program = by_another_clock(&site);
+    site.awaits_red();
+    fs::write(site.path("ahead"), "+3d").unwrap();
+    let said = |begins: &str| {
+        site.lines("advice")
+            .iter()
+            .any(|line| line.starts_with(begins))
+    };
+    eventually("that it is unknown", || {
+        said("unknown firing beside:red RED STAYS IN FORCE")
+    });
+    assert!(
+        said("red firing beside: Evacuate"),
+        "{:?}",
+        site.lines("advice")
+    );
+    program.stop();
+}

@@ -20,6 +20,7 @@ use crate::runtime::standing::{TakenOrders, closed, in_force, silence_of_the_sit
 use crate::store::Store;
 use anyhow::Context;
 use clap::Subcommand;
+use clap::builder::NonEmptyStringValueParser;
 use jiff::SignedDuration;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -36,10 +37,10 @@ pub(super) struct AlertsArgs {
 #[derive(Debug, clap::Args)]
 struct GivenArgs {
     /// Who
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
     by: Option<String>,
     /// Why
-    #[arg(long, value_name = "TEXT")]
+    #[arg(long, value_name = "TEXT", value_parser = NonEmptyStringValueParser::new())]
     why: Option<String>,
 }
 
@@ -175,7 +176,34 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
     let asked = store.ask(&order, None);
     asked.map_err(|error| unwritten::explained(&config, error.into()))?;
     let is_running = Store::is_held(&config.site.state_dir);
-    site.output.print(&order, |_| taken(&order, is_running))
+    let concerned = concerned(&store, &order)?;
+    site.output
+        .print(&order, |_| taken(&order, is_running) + &concerned)
+}
+
+/// What an acknowledgement or a silence of the whole site concerns: whoever leaves out `--benchmark` may mean one.
+fn concerned(store: &Store, order: &Order) -> anyhow::Result<String> {
+    let what = match order {
+        Order::Acknowledge {
+            benchmark: None, ..
+        } => "acknowledges all that is in force",
+        Order::Silence {
+            benchmark: None, ..
+        } => "silences the whole site, in force there now",
+        Order::Acknowledge { .. }
+        | Order::Silence { .. }
+        | Order::Shelve { .. }
+        | Order::Resolve { .. }
+        | Order::Unsilence { .. } => return Ok(String::new()),
+    };
+    let in_force = in_force(store, None)?;
+    let each = in_force.keys().map(|(place, level)| {
+        let place = place.as_ref().map_or("the site", BenchmarkId::as_str);
+        format!("{level} of {}", text::plain(place))
+    });
+    let each = each.collect::<Vec<String>>().join(", ");
+    let each = if each.is_empty() { "nothing" } else { &each };
+    Ok(format!("{what}: {each}; --benchmark names one alone\n"))
 }
 
 /// What becomes of an order that has been left in the state.

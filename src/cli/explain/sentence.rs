@@ -3,7 +3,7 @@
 use crate::cli::table::time;
 use crate::effects::{
     DeclaredEffect, Effect, Explained, Explanation, Form, Kind, Rival, SizeInWords, Structure,
-    TOO_FEW, Together,
+    TOO_FEW, Together, may_be_slip,
 };
 use crate::reading::BenchmarkId;
 
@@ -65,6 +65,10 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
     let is_slow_alike = rivals().any(|rival| rival.kind == Kind::UNEXPLAINED);
     if !explanation.verdict.effect.is_an_end() {
         said.push(match explanation.explained {
+            Explained::Full if explanation.verdict.effect == Kind::CORRELATED_NOISE => {
+                "No effect is found: with that noise the residual cannot be distinguished from noise."
+                    .to_owned()
+            }
             Explained::Full => {
                 "Explained in full: the residual that is left cannot be distinguished from noise."
                     .to_owned()
@@ -89,7 +93,9 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
         } else if explanation.verdict.effect.is_of_the_reading() {
             let mut also = explanation.also.iter();
             let is_all = also.all(|effect| effect.effect.is_of_the_reading());
-            said.push(if is_all {
+            said.push(if may_be_slip(explanation) {
+                "It lies in the measurement, or the slope has slipped: these readings do not show which.".to_owned()
+            } else if is_all && explanation.explained != Explained::Partly {
                 "It lies in the measurement, not in the slope.".to_owned()
             } else {
                 "That lies in the measurement; not all that follows does.".to_owned()

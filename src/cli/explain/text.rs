@@ -148,9 +148,20 @@ mod tests {
     fn an_effect_of_the_reading_is_not_said_of_the_slope() {
         let offset = Explanation {
             verdict: an_offset(),
+            explained: Explained::Full,
             ..lake()
         };
         assert!(text(&offset).contains("It lies in the measurement, not in the slope."));
+        let forward = Explanation {
+            verdict: Effect {
+                size: Some(12.0),
+                ..an_offset()
+            },
+            ..lake()
+        };
+        let said = text(&forward);
+        assert!(said.contains("or the slope has slipped"), "{said}");
+        assert!(!said.contains("not in the slope"), "{said}");
         assert!(!text(&lake()).contains("It lies in the measurement"));
     }
 

@@ -37,10 +37,23 @@ pub(super) fn zone_in_name(name: &str) -> Option<TimeZone> {
     if let Some(zone) = bracketed(name).filter(|zone| zone.contains('/')) {
         return value::time_zone(zone).ok();
     }
-    let plain = name.to_ascii_uppercase();
+    let plain = name.to_ascii_uppercase().replace('\u{2212}', "-");
     let at = ["UTC", "GMT"].iter().find_map(|word| plain.find(word))?;
     let is_within = plain[..at].ends_with(|one: char| one.is_alphanumeric());
     let rest = &plain[at + 3..];
+    let behind = rest.trim_start();
+    let rest = if behind.starts_with(['+', '-']) {
+        behind
+    } else if behind.contains(|one: char| one.is_ascii_digit())
+        || behind.contains("PLUS")
+        || behind.contains("MINUS")
+        || behind.contains("OFFSET")
+    {
+        // An offset that is written in a way of its own: for people to say.
+        return None;
+    } else {
+        rest
+    };
     let offset: String = rest
         .chars()
         .take_while(|one| one.is_ascii_digit() || "+-:".contains(*one))
@@ -49,23 +62,43 @@ pub(super) fn zone_in_name(name: &str) -> Option<TimeZone> {
     if is_within || !is_end {
         return None;
     }
-    value::time_zone(&plain[at..at + 3 + offset.len()]).ok()
+    value::time_zone(&format!("{}{offset}", &plain[at..at + 3])).ok()
+}
+
+/// The zones that letters stand for in the name of a column, of which none is UTC, and their hours before UTC.
+const LETTERS: [(&str, i8); 9] = [
+    ("CET", 1),
+    ("MEZ", 1),
+    ("CEST", 2),
+    ("MESZ", 2),
+    ("EET", 2),
+    ("EST", -5),
+    ("CST", -6),
+    ("MST", -7),
+    ("PST", -8),
+];
+
+fn zone_by_letters(name: &str) -> Option<(&'static str, TimeZone)> {
+    let mut words = name.split(|one: char| !one.is_alphanumeric());
+    let found = words.find_map(|word| LETTERS.iter().find(|(letters, _)| *letters == word))?;
+    Some((found.0, TimeZone::fixed(jiff::tz::offset(found.1))))
 }
 
 /// What is said where the name of a column of times has another zone than is stated.
 pub(super) fn another_zone(name: &str, stated: &TimeZone) -> Option<String> {
-    let named = zone_in_name(name)?;
+    let by_letters = || zone_by_letters(name).map(|(letters, zone)| (letters.to_owned(), zone));
+    let by_name = |zone: TimeZone| (zone.iana_name().unwrap_or("UTC").to_owned(), zone);
+    let (word, named) = zone_in_name(name).map(by_name).or_else(by_letters)?;
     // A day of winter, and one of summer.
     let differ = ["2026-01-15T12:00:00Z", "2026-07-15T12:00:00Z"]
         .iter()
         .filter_map(|day| day.parse::<Timestamp>().ok())
         .any(|day| named.to_offset(day) != stated.to_offset(day));
-    let shown = |zone: &TimeZone| zone.iana_name().unwrap_or("UTC").to_owned();
     differ.then(|| {
         format!(
             "column {name:?} has the zone {} in its name, and --time-zone is {}, which counts: is that right?",
-            shown(&named),
-            shown(stated)
+            word,
+            stated.iana_name().unwrap_or("UTC")
         )
     })
 }
@@ -114,6 +147,11 @@ mod tests {
             ("Timestamp_GMT+08:00", Some("Etc/GMT-8")),
             ("Time (UTC+1)", Some("Etc/GMT-1")),
             ("Time (GMT-03)", Some("Etc/GMT+3")),
+            ("Time (UTC -7)", Some("Etc/GMT+7")),
+            ("Time [UTC +1]", Some("Etc/GMT-1")),
+            ("Time (UTC\u{2212}7)", Some("Etc/GMT+7")),
+            ("Time (UTC plus 2)", None),
+            ("UTC offset 02:00", None),
             ("Zeit [Europe/Rome]", Some("Europe/Rome")),
             ("time", None),
             ("Time (local)", None),
@@ -127,6 +165,9 @@ mod tests {
         let rome = TimeZone::get("Europe/Rome").unwrap();
         assert!(another_zone("Time (UTC)", &rome).is_some());
         assert!(another_zone("Time (UTC)", &TimeZone::UTC).is_none());
+        let said = another_zone("Time (MST)", &rome).unwrap();
+        assert!(said.contains("has the zone MST in its name"), "{said}");
+        assert!(another_zone("test", &rome).is_none());
     }
 
     #[test]

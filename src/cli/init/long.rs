@@ -11,8 +11,19 @@ const FILLED_PERCENT: usize = 90;
 /// Names that are shown.
 const SHOWN: usize = 3;
 /// Words that a column of names may begin with, one of the words in its name.
-const OF_POINTS: [&str; 12] = [
+const OF_POINTS: [&str; 23] = [
     "benchmark",
+    "node",
+    "device",
+    "channel",
+    "kanal",
+    "canal",
+    "capteur",
+    "sonde",
+    "sonda",
+    "prisma",
+    "messstelle",
+    "extenso",
     "point",
     "punkt",
     "punto",
@@ -25,6 +36,10 @@ const OF_POINTS: [&str; 12] = [
     "instrument",
     "gauge",
 ];
+/// The same as whole words.
+const POINT_WORDS: [&str; 5] = ["id", "name", "no", "nr", "pt"];
+/// Of the rows of points that are read in turn, in a hundred so many have the name of the row one round before.
+const IN_ROUNDS_PERCENT: usize = 80;
 /// Parts of the names of columns that say something of a point.
 const OF_THEIR_STATE: [&str; 9] = [
     "status", "state", "flag", "quality", "remark", "comment", "type", "unit", "zustand",
@@ -70,7 +85,8 @@ pub(super) fn names_of_points(
     ))
 }
 
-/// Whether the cells of a column name points: few names that repeat, and several of them at one time, or one after another.
+/// Whether the cells of a column name points: few names that repeat, and several of them at one time, or one after another; where the
+/// column's name says so also one below the other.
 fn are_names(name: &str, cells: &[String], times: &[&Vec<String>], dialect: &Dialect) -> bool {
     let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
     let distinct: BTreeSet<&String> = cells.iter().filter(|cell| !cell.is_empty()).collect();
@@ -86,18 +102,42 @@ fn are_names(name: &str, cells: &[String], times: &[&Vec<String>], dialect: &Dia
     let together = 2 * at_one_time(cells, times) >= cells.len();
     let changes = cells.windows(2).filter(|pair| pair[0] != pair[1]).count();
     let in_turn = 2 * changes + 1 >= cells.len();
-    (is_text && (together || is_named && in_turn)) || (is_counted && is_named && together)
+    // Readings in whole millimetres change from row to row too, and not in rounds.
+    let after_a_round = cells.iter().zip(cells.iter().skip(distinct.len()));
+    let same = after_a_round.filter(|(one, next)| one == next).count();
+    let in_rounds = 100 * same >= IN_ROUNDS_PERCENT * cells.len().saturating_sub(distinct.len());
+    let one_below_the_other = || begins_anew(cells, times);
+    (is_text
+        && (together || in_turn && !is_of_their_state(name) || is_named && one_below_the_other()))
+        || (is_counted && (together || is_named && in_turn && in_rounds))
+}
+
+/// Whether the times go back wherever another name begins, and it is so once at least.
+fn begins_anew(cells: &[String], times: &[&Vec<String>]) -> bool {
+    let time = |row: usize| -> Vec<&String> {
+        let each = times.iter().filter_map(|column| column.get(row));
+        each.collect()
+    };
+    let mut changes = (1..cells.len())
+        .filter(|row| cells[*row] != cells[row - 1])
+        .peekable();
+    changes.peek().is_some() && changes.all(|row| time(row) < time(row - 1))
+}
+
+fn is_of_their_state(name: &str) -> bool {
+    let plain = name.to_lowercase();
+    OF_THEIR_STATE.iter().any(|part| plain.contains(part))
 }
 
 fn is_of_points(name: &str) -> bool {
     let plain = name.trim().to_lowercase();
-    if OF_THEIR_STATE.iter().any(|part| plain.contains(part)) {
+    if is_of_their_state(&plain) {
         return false;
     }
     let mut words = plain.split(|letter: char| !letter.is_alphanumeric());
-    plain == "id"
-        || plain == "name"
-        || words.any(|word| OF_POINTS.iter().any(|point| word.starts_with(point)))
+    words.any(|word| {
+        POINT_WORDS.contains(&word) || OF_POINTS.iter().any(|point| word.starts_with(point))
+    })
 }
 
 /// How many rows have the time of another row that has another name.

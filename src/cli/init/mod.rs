@@ -318,8 +318,10 @@ fn say_idle(plan: &InitPlan, args: &Args) {
 
 fn twice(file: &Path, other: &PlannedBenchmark) -> String {
     format!(
-        "{}: benchmark {:?} is in source {:?} too; give each its own id with --column NAME=ID:QUANTITY:UNIT, \
-         or name one of the files and then write its path with a * for the others, as in path = \"toc-*.csv\"",
+        "{}: benchmark {:?} is in source {:?} too. If these are two sensors, give each its own id with --column NAME=ID:QUANTITY:UNIT; where \
+         both files name the column alike, run init for one of them, and copy its [[source]] and [[benchmark]] in the config for the other, with \
+         another id and path. If it is one sensor, whose files follow each other in time, name one of them and then write its path with a *, as \
+         in path = \"toc-*.csv\"",
         file.display(),
         other.id,
         other.source
@@ -371,6 +373,13 @@ fn written(
             };
             if let Some(remark) = &survey.encoding {
                 exit::complain(&format_args!("{}: {remark}", file.display()));
+            }
+            for doubt in survey
+                .names
+                .iter()
+                .filter_map(|name| unnamed::not_a_total(name))
+            {
+                exit::complain(&format_args!("{}: {doubt}", file.display()));
             }
             let columns = &args.file.columns;
             let is_mapped = |name: &str| columns.iter().any(|map| map.column == name);

@@ -25,7 +25,7 @@ const TIMES: [&str; 6] = [
     " %I:%M:%S %p",
 ];
 /// The same without colons, after a year of four digits: behind two of them a blank need not stand, and `2017` would be a year and an hour.
-const TIMES_WITHOUT_COLONS: [&str; 5] = [" %H%M", " %H%M%S", " %H.%M", " %Hh%M", " %H"];
+const TIMES_WITHOUT_COLONS: [&str; 5] = [" %H", " %H%M", " %H%M%S", " %H.%M", " %Hh%M"];
 /// Parts of names of columns whose numbers may be times of day.
 const NAMES_OF_TIMES_OF_DAY: [&str; 9] = [
     "time", "zeit", "uhr", "stunde", "ora", "heure", "hora", "hour", "hhmm",

@@ -4,6 +4,15 @@ use crate::reading::{CovariateKind, Unit, bracketed};
 use crate::runtime::ingest::{FileSurvey, Meaning, unit_in_name};
 use std::path::Path;
 
+/// Parts of the names of columns that may have what was added since the reading before.
+const OF_EACH_READING: [&str; 5] = [
+    "increment",
+    "inkrement",
+    "zuwachs",
+    "since last",
+    "since previous",
+];
+
 /// Which flag names the readings of a file where no column does; where one does, what is wrong with its rows.
 pub(super) fn without_readings(
     file: &Path,
@@ -67,7 +76,7 @@ pub(super) fn without_readings(
         None if stated.is_some() => ("displacement", "UNIT".to_owned()),
         None if first.contains("_per_") || first.contains('/') => ("velocity", "UNIT".to_owned()),
         None if first.contains(['_', '[', '(']) => ("displacement", "UNIT".to_owned()),
-        None => ("displacement", "mm".to_owned()),
+        None => ("displacement", "UNIT".to_owned()),
     };
     let example = format!("{first}=P1:{quantity}:{unit}");
     format!(
@@ -79,6 +88,18 @@ pub(super) fn without_readings(
         format!("{first}=level"),
         coordinates(&numbers).map_or_else(String::new, |columns| by_hand(&columns)),
     )
+}
+
+/// What is said of a column whose name says that its displacements count from the reading before.
+pub(super) fn not_a_total(name: &str) -> Option<String> {
+    let plain = name.to_lowercase();
+    let is_one = OF_EACH_READING.iter().any(|part| plain.contains(part));
+    is_one.then(|| {
+        format!(
+            "column {name:?}: displacements are read as totals since the first reading; where this one has what was added since the reading \
+             before, its values must be summed first"
+        )
+    })
 }
 
 /// What is wrong with a benchmark of which most readings cannot be used.

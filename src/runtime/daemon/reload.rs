@@ -130,7 +130,10 @@ impl Daemon {
         self.reporting.service.reloading();
         // What has been read already is taken under the old config.
         self.sources.stop();
-        while let Some(batch) = self.sources.batches.recv().await {
+        // A file system that does not answer is not waited for: what has not been taken is read again.
+        while let Ok(Some(batch)) =
+            tokio::time::timeout(DRAIN_LIMIT, self.sources.batches.recv()).await
+        {
             tokio::task::block_in_place(|| self.take_batch(batch, shutdown))?;
             // Cut short half-way: what lies behind must not move the files' positions beyond it.
             if shutdown.is_requested() {

@@ -24,6 +24,11 @@ pub(super) fn is_severe(alert: &Alert) -> bool {
     severity(alert) >= 4
 }
 
+/// Whether red is called.
+pub(super) fn is_red(alert: &Alert) -> bool {
+    alert.level == Level::Red && alert.state == MessageState::Firing
+}
+
 /// What is reported by one run at a time, so that its order stays.
 pub(super) fn place(alert: &Alert) -> Option<&BenchmarkId> {
     alert.event.benchmark.as_ref()

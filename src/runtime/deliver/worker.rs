@@ -1,8 +1,9 @@
 //! The worker of one hook: what is due, in the order of its severity, a few at once.
 
-use super::order::{is_severe, place, severity};
+use super::order::{is_red, is_severe, place, severity};
 use super::running::{Running, Waiting, finished, news, until};
 use super::{QUEUE, Retry, Runner, locked};
+use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::reading::{Timestamp, counted};
 use crate::runtime::clock;
@@ -25,9 +26,10 @@ const LOOK_AGAIN_MUTED: Duration = Duration::from_secs(1);
 
 /// Runs of one hook at a time, each for another benchmark.
 const MOST_AT_ONCE: usize = 4;
-/// So many more of red and orange: runs for less that hang keep none of them waiting.
+/// So many more of orange, and of red twice as many: runs for less that hang keep none of them waiting.
 const MORE_OF_SEVERE: usize = 2;
-/// A run that lasts longer than this does not keep a graver alert of its own benchmark waiting either, and is broken off for it; the run of an end does.
+/// A run that lasts longer than this does not keep a graver alert of its own benchmark waiting either, and is broken off for it. The run of an
+/// end does, but for red: it is then tried again.
 const KEEPS_WAITING: Duration = Duration::from_secs(10);
 
 /// What is shown of a hook where others than its owner look: without its arguments, which may hold addresses and secrets.
@@ -140,9 +142,9 @@ impl Worker {
         }
     }
 
-    /// When the next one may be started; on the way out all are due.
+    /// When the next one may be started; on the way out all are due but those that are held, which stay in the outbox.
     fn next_due(&self, open: bool) -> Option<Instant> {
-        let waiting = self.waiting.iter();
+        let waiting = self.waiting.iter().filter(|(_, one)| open || !one.is_held);
         let now = clock::later(Duration::ZERO);
         let due = |due: Instant| if open { due } else { now };
         let each = waiting.filter_map(|((at, _), one)| self.free_from(due(*at), one));
@@ -152,8 +154,8 @@ impl Worker {
     /// From when on it may be started, at `due` or later; `None` before another run has ended.
     fn free_from(&self, due: Instant, waiting: &Waiting) -> Option<Instant> {
         let is_severe = is_severe(&waiting.alert);
-        let more = if is_severe { MORE_OF_SEVERE } else { 0 };
-        if self.running.len() >= MOST_AT_ONCE + more {
+        let levels = usize::from(is_severe) + usize::from(is_red(&waiting.alert));
+        if self.running.len() >= MOST_AT_ONCE + levels * MORE_OF_SEVERE {
             return None;
         }
         let mut at_its_place = self
@@ -161,9 +163,16 @@ impl Worker {
             .iter()
             .filter(|run| place(&run.waiting.alert) == place(&waiting.alert));
         at_its_place.try_fold(due, |from, run| {
-            let of_less = run.waiting.alert.state == MessageState::Firing
-                && severity(&waiting.alert) > severity(&run.waiting.alert);
-            (is_severe && of_less).then(|| from.max(run.started + KEEPS_WAITING))
+            let of_less = severity(&waiting.alert) > severity(&run.waiting.alert);
+            let gives_way = match run.waiting.alert.state {
+                MessageState::Firing => is_severe,
+                // The end of another red comes before a red that begins.
+                MessageState::Resolved => {
+                    is_red(&waiting.alert) && run.waiting.alert.level != Level::Red
+                }
+                MessageState::Correction => false,
+            };
+            (gives_way && of_less).then(|| from.max(run.started + KEEPS_WAITING))
         })
     }
 
@@ -207,7 +216,12 @@ impl Worker {
         let is_there = |run: &mut Running| place(&run.waiting.alert) == place(graver);
         let broken_off: Vec<Running> = self.running.extract_if(.., is_there).collect();
         for run in broken_off {
-            self.drop_over(&run.waiting.alert);
+            let Waiting { alert, attempt, .. } = &run.waiting;
+            if alert.state == MessageState::Resolved {
+                self.try_again(alert, *attempt);
+            } else {
+                self.drop_over(alert);
+            }
         }
     }
 
@@ -284,25 +298,8 @@ impl Worker {
         } else if self.is_over(&waiting.alert) {
             self.drop_over(&waiting.alert);
         } else if open && goes_on {
-            let delay = self.retry.delay(&key, attempt);
-            let delay_s = delay.as_secs_f64();
-            tracing::warn!(
-                hook,
-                key,
-                attempt,
-                ?outcome,
-                delay_s,
-                "hook will be retried"
-            );
-            self.note(&waiting.alert, DeliveryOutcome::Waiting);
-            let again = Waiting {
-                alert: waiting.alert.clone(),
-                attempt: attempt.saturating_add(1),
-                is_new: false,
-                escalation: None,
-                is_held: false,
-            };
-            self.wait(again, clock::later(delay));
+            tracing::warn!(hook, key, attempt, ?outcome, "hook will be retried");
+            self.try_again(&waiting.alert, attempt);
         } else {
             self.lost += 1;
             let outcome = if open {
@@ -315,6 +312,24 @@ impl Worker {
             };
             self.finish(&waiting.alert, outcome);
         }
+    }
+
+    fn try_again(&mut self, alert: &Alert, attempt: u32) {
+        let delay = self.retry.delay(&alert.key, attempt);
+        tracing::debug!(
+            alert.key,
+            delay_s = delay.as_secs_f64(),
+            "waits for its next attempt"
+        );
+        self.note(alert, DeliveryOutcome::Waiting);
+        let again = Waiting {
+            alert: alert.clone(),
+            attempt: attempt.saturating_add(1),
+            is_new: false,
+            escalation: None,
+            is_held: false,
+        };
+        self.wait(again, clock::later(delay));
     }
 
     /// A hook that fails is shown as such until it takes an alert.

@@ -1,6 +1,5 @@
 //! What a message says of a level, and whether it means it: the words for both.
 
-use crate::alert::Level;
 use crate::monitor::AlertState;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,7 +12,7 @@ pub(super) const CORRECTION: &str = "correction";
 pub enum Status {
     /// The daemon's own.
     Actual,
-    /// From a replay.
+    /// From a replay or a drill.
     Exercise,
     /// From `hook test`.
     Test,
@@ -29,12 +28,7 @@ impl Status {
         }
     }
 
-    /// What people are recommended to do by this level: whoever reads this line alone is to know whether it is meant.
-    pub(in crate::runtime) fn recommended(self, level: Level) -> String {
-        self.marked(level.recommended())
-    }
-
-    /// `text` as it is, or marked as part of an exercise or a test.
+    /// `text` as it is, or marked as part of an exercise or a test: whoever reads this line alone is to know whether it is meant.
     pub(in crate::runtime) fn marked(self, text: &str) -> String {
         match self {
             Self::Actual => text.to_owned(),

@@ -118,11 +118,16 @@ impl BrokerMessage {
         }
     }
 
-    /// The content has been read: many messages may wait to be acknowledged.
+    /// The content has been read: many messages may wait to be acknowledged. An emptied payload would still keep its memory.
     pub(super) fn forget_payload(&mut self) {
         match &mut self.of {
-            Published::Five(_, publish) => publish.payload.clear(),
-            Published::Three(_, publish) => publish.payload.clear(),
+            Published::Five(_, publish) => {
+                // Each of them is a part of the packet.
+                drop(std::mem::take(&mut publish.payload));
+                drop(std::mem::take(&mut publish.topic));
+                publish.properties = None;
+            }
+            Published::Three(_, publish) => drop(std::mem::take(&mut publish.payload)),
         }
     }
 

@@ -10,6 +10,9 @@ use crate::reading::{
 use jiff::tz::TimeZone;
 use std::collections::BTreeSet;
 
+/// Readings that are replaced by another of the same time, at least, and one in so many, where they may be of two sensors.
+const FEWEST_REPLACED: u64 = 20;
+const REPLACED_OF: u64 = 4;
 /// Readings of a benchmark that say how often it is measured, the latest.
 const LATEST: usize = 200;
 /// Readings from which on a sign is doubted, where of all that they go by this share is backwards.
@@ -281,7 +284,18 @@ impl PreviewTrack {
         let all = ahead.chain(other).chain(of_values);
         let not_accepted = all.filter(|one| !self.accepted.contains(&one.kind));
         let texts = not_accepted.map(|one| one.text);
-        texts.chain(of_resets).chain(backwards).collect()
+        let texts = texts.chain(of_resets).chain(backwards);
+        texts.chain(self.of_two_sensors()).collect()
+    }
+
+    /// Where so many readings are replaced by another of the same time that they may be of another sensor.
+    fn of_two_sensors(&self) -> Option<String> {
+        let (corrected, readings) = (self.view.corrected, self.view.readings);
+        (corrected >= FEWEST_REPLACED && REPLACED_OF * corrected >= readings).then(|| {
+            format!(
+                "{corrected} readings are replaced by another one of the same time: do files, or rows, of two sensors go into this benchmark?"
+            )
+        })
     }
 
     /// What to do where the displacement falls all along, or the velocity is negative.

@@ -11,6 +11,8 @@ use crate::store::{Presence, StoreError};
 use jiff::SignedDuration;
 use std::time::Duration;
 
+/// No clock is taken to be behind by more than this because a logger's time goes on steadily: that of a logger whose year is wrong does so too.
+const MOST_BEHIND: SignedDuration = SignedDuration::from_hours(400 * 24);
 /// The first day of 1970, UTC: where a logger starts whose clock is not set. No reading of a site that is watched now
 /// was measured then; a replay of an archive takes it.
 const CLOCKLESS: std::ops::Range<Timestamp> =
@@ -164,7 +166,7 @@ impl Site {
             if self.sinks.store.is_some()
                 && (self.keeper.is_behind(host_time) || self.may_prove_it(arrival))
             {
-                return self.hold(arrival);
+                return self.hold(arrival, host_time);
             }
             self.set_aside(arrival);
             return true;
@@ -184,9 +186,10 @@ impl Site {
     }
 
     /// Holds a value until the host's clock is right; `false` where the loggers' time has proved right by now.
-    fn hold(&mut self, arrival: &Arrival) -> bool {
+    fn hold(&mut self, arrival: &Arrival, host_time: Timestamp) -> bool {
         if let Input::Reading { benchmark, .. } = &arrival.input
             && self.is_newest(arrival)
+            && arrival.time.duration_since(self.keeper.now(host_time)) <= MOST_BEHIND
             && self.keeper.holds(benchmark.as_str(), arrival.time)
         {
             tracing::warn!(%benchmark, time = %arrival.time, "the loggers' time goes on steadily: it counts, and the host's clock does not");
@@ -204,6 +207,10 @@ impl Site {
         let mut events = Vec::new();
         if self.held.is_empty() {
             return Ok(events);
+        }
+        // Where nothing more is taken in the past is never read to its end. What stands in the files comes by time: what is known by now decides.
+        if self.holds_too_many() && !self.unproven.is_over() {
+            self.prove(host_time);
         }
         let latest = self.keeper.now(host_time).max(host_time);
         let is_right = self.unproven.is_over() && !self.keeper.is_behind(host_time);

@@ -32,11 +32,12 @@ use standing::StandingAlerts;
 use timekeeper::{PauseLength, Timekeeper};
 use waiting::WaitingReadings;
 
+use crate::alert::Level;
 use crate::monitor::{Event, EventKind, Input, Monitor, Notice, RESET_FOUND, SUSPECT, Settings};
 use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
 use crate::runtime::clock::Stopwatch;
 use crate::runtime::deliver::Dispatcher;
-use crate::runtime::hook::{Alert, Status};
+use crate::runtime::hook::{Alert, MessageState, Status};
 use crate::runtime::searches::Searches;
 use crate::runtime::tail::Arrival;
 use crate::store::{Batch, LeftOrder, Position, Store, StoreError};
@@ -340,12 +341,14 @@ impl Site {
             };
         }
         let failure_time = self.failure_times.get(&event.benchmark).copied();
-        self.fresh.extend(Alert::new(
-            event,
-            &self.name,
-            failure_time,
-            self.sinks.status,
-        ));
+        let alert = Alert::new(event, &self.name, failure_time, self.sinks.status);
+        self.fresh.extend(alert.map(|alert| {
+            let benchmark = event.benchmark.as_ref();
+            let is_unknown = alert.level == Level::Unknown && alert.state == MessageState::Firing;
+            let in_force = benchmark.and_then(|benchmark| self.monitor.level(benchmark));
+            let beside = in_force.filter(|level| is_unknown && *level > Level::Green);
+            Alert { beside, ..alert }
+        }));
     }
 
     /// What has been counted.

@@ -81,7 +81,8 @@ impl Site {
     /// Whether a value that lies ahead of the clock may be one that proves it wrong.
     pub(super) fn may_prove_it(&mut self, arrival: &Arrival) -> bool {
         let Input::Reading { benchmark, .. } = &arrival.input else {
-            return false;
+            // Rain and levels of lakes prove nothing, and are needed with the readings beside them.
+            return matches!(arrival.input, Input::Sample { .. }) && !self.unproven.is_over();
         };
         let newest = self.read.newest(benchmark);
         newest.is_some_and(|newest| self.unproven.continues(benchmark, arrival.time, newest))

@@ -193,11 +193,12 @@ impl FileTail {
                 return;
             }
             self.mark_handed_out();
+            let before = self.at;
             match self.advance() {
                 Ok(true) => {
                     self.trouble = None;
                     turn += READ_BYTES as u64;
-                    self.count_valueless();
+                    self.count_valueless(before);
                 }
                 Ok(false) => {
                     // A packed file is tried again when it has changed, and the trouble with it lasts until then.
@@ -219,12 +220,23 @@ impl FileTail {
         }
     }
 
-    fn count_valueless(&mut self) {
+    /// Counts what has been read since `before` and gave no value; of a packed file, what was unpacked. A recording may have other things than
+    /// readings, as the pictures of a camera.
+    fn count_valueless(&mut self, before: u64) {
         if !self.pending.is_empty() {
             self.valueless = 0;
             return;
         }
-        self.valueless += READ_BYTES as u64;
+        let is_recording = matches!(self.content, Content::Mcap { .. });
+        self.valueless += match self.content {
+            Content::Packed(_) => READ_BYTES as u64,
+            Content::Text(_) | Content::Mcap { .. } | Content::Refused(_) | Content::Complete => {
+                self.at.saturating_sub(before)
+            }
+        };
+        if is_recording {
+            return;
+        }
         if self.valueless > REFUSED_BYTES {
             self.valueless = 0;
             let error = format!("{REFUSED_BYTES} bytes without a value");

@@ -1,5 +1,6 @@
 //! Follows the files of all sources and puts what they hold in the order of its measurement.
 
+use super::at_work::AtWork;
 use super::decode::{Arrival, Decoder};
 use super::departed::hold_newest;
 use super::file::FileTail;
@@ -81,6 +82,7 @@ pub struct Follower {
     pub(super) lost: Vec<Arrival>,
     /// Files whose names are no text, as they were reported.
     pub(super) not_text: BTreeSet<PathBuf>,
+    pub(super) at_work: AtWork,
 }
 
 impl Follower {
@@ -128,13 +130,24 @@ impl Follower {
             at_once: left,
             lost: Vec::new(),
             not_text: BTreeSet::new(),
+            at_work: AtWork::default(),
         }
     }
 
-    /// The folders to watch.
-    pub fn folders(&self) -> BTreeSet<PathBuf> {
+    /// Which source is being read.
+    pub(super) fn at_work(&self) -> &AtWork {
+        &self.at_work
+    }
+
+    /// The folders of the sources, by their numbers.
+    pub(super) fn folders(&self) -> Vec<PathBuf> {
         let folders = self.sources.iter().map(|source| source.pattern.folder());
         folders.map(Path::to_owned).collect()
+    }
+
+    /// Whether all files have held no more before: what comes is live.
+    pub(super) fn goes_on_live(&mut self, is_live: bool) {
+        self.is_live = is_live;
     }
 
     /// Whether there is a file of this source.
@@ -181,6 +194,7 @@ impl Follower {
             self.rescan();
             self.expect_unended_files();
             for (key, file) in &mut self.files {
+                self.at_work.comes_to(key.0);
                 file.refill();
                 self.heads.extend(head(key.clone(), file));
             }
@@ -209,6 +223,7 @@ impl Follower {
                 continue;
             };
             read += 1;
+            self.at_work.comes_to(key.0);
             direct.extend(next_of(file, &mut self.sources[key.0], host_time));
             file.refill();
             self.heads.extend(head(key, file));
@@ -246,6 +261,7 @@ impl Follower {
             if read.contains(key) {
                 continue;
             }
+            self.at_work.comes_to(key.0);
             file.refill();
             while live.len() < LIVE_BATCH / 2 && !file.pending.is_empty() {
                 live.extend(next_of(file, &mut self.sources[key.0], host_time));

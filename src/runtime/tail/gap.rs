@@ -27,8 +27,12 @@ impl FileTail {
             && (self.is_restored || !self.is_old())
     }
 
-    /// Whether what was read last stands in the file at `path`, in its place.
+    /// Whether what was read last stands in the file at `path`, in its place. What is no file is not opened: a pipe without a writer keeps
+    /// whoever opens it waiting.
     pub(super) fn goes_on(&self, path: &Path) -> bool {
+        if !path.is_file() {
+            return false;
+        }
         let length = self.at - self.mark_start();
         let bytes = File::open(path).and_then(|file| read_at(&file, self.mark_start(), length));
         bytes.is_ok_and(|bytes| bytes == self.mark)

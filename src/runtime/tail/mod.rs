@@ -7,12 +7,14 @@
 //! A follower goes on from the positions that it reported before and that were kept together with the values before
 //! them; whoever takes the values drops what it has seen.
 
+mod at_work;
 mod decode;
 mod departed;
 mod faults;
 mod file;
 mod follow;
 mod gap;
+mod hanging;
 mod known;
 pub mod lines;
 mod position;
@@ -24,24 +26,24 @@ mod rescan;
 mod rotation;
 mod saved;
 mod text;
+mod watch;
 
 pub(super) use decode::Decoder;
 pub use decode::{Arrival, is_taken, options_of};
 pub use follow::{ArrivalBatch, Follower};
+pub use hanging::FollowedFiles;
 pub use known::KnownFiles;
 pub use reorder::WaitingReading;
 pub(super) use rescan::list;
-pub(super) use text::{BadLine, LinesRead, MOST_REFUSED, RefusedRows, TextReader};
+pub(super) use text::{BadLine, LinesRead, MOST_REFUSED, RefusedRows, TextReader, guarded};
 
 use super::clock::{self, Stopwatch};
 use super::service_faults::ServiceFaults;
 use super::shutdown::Shutdown;
-use notify::{RecommendedWatcher, RecursiveMode, Watcher};
-use std::collections::BTreeSet;
-use std::path::PathBuf;
+use hanging::Looked;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::{Notify, mpsc};
+use tokio::sync::mpsc;
 use tokio::time::MissedTickBehavior;
 
 /// How often the files are read when the system reports no change of them.
@@ -61,25 +63,36 @@ const LONGEST_REST: Duration = Duration::from_millis(200);
 /// # Errors
 /// When a reading task broke off.
 pub async fn follow(
-    mut follower: Follower,
+    mut files: FollowedFiles,
     batches: mpsc::Sender<ArrivalBatch>,
     faults: ServiceFaults,
     mut shutdown: Shutdown,
 ) -> Result<(), tokio::task::JoinError> {
-    let mut watch = FolderWatch::new(follower.folders());
+    let mut readers = Box::new(files.readers());
     let mut rescan = tokio::time::interval(RESCAN);
     rescan.set_missed_tick_behavior(MissedTickBehavior::Delay);
     // At least once, so that it is kept of which benchmarks the files are read from here on.
     loop {
-        watch.renew();
+        if files.take_back() {
+            readers = Box::new(files.readers());
+        }
         let looking = Stopwatch::start();
-        let batch;
-        (follower, batch) = tokio::task::spawn_blocking(move || {
-            let batch = follower.poll(clock::now());
-            (follower, batch)
-        })
-        .await?;
-        faults.are_of_files(follower.faults());
+        let batch = match files.look(readers).await? {
+            Looked::Read(back, batch) => {
+                readers = back;
+                batch
+            }
+            Looked::Hangs => {
+                readers = Box::new(files.readers());
+                faults.are_of_files(files.faults());
+                if shutdown.is_requested() {
+                    return Ok(());
+                }
+                continue;
+            }
+        };
+        faults.are_of_files(readers.follower.faults().into_iter().chain(files.faults()));
+        let wake = Arc::clone(readers.watch.wake());
         let rest = (REST * looking.elapsed()).clamp(SHORTEST_REST, LONGEST_REST);
         let rested = clock::later(rest);
         let (waits, rests) = (
@@ -102,57 +115,10 @@ pub async fn follow(
         }
         if waits {
             tokio::select! {
-                () = watch.wake.notified() => tokio::time::sleep_until(rested).await,
+                () = wake.notified() => tokio::time::sleep_until(rested).await,
                 _ = rescan.tick() => {}
                 () = shutdown.requested() => return Ok(()),
             }
         }
-    }
-}
-
-/// One watcher for all folders.
-#[derive(Debug)]
-struct FolderWatch {
-    watcher: Option<RecommendedWatcher>,
-    unwatched: BTreeSet<PathBuf>,
-    /// Of which it has been said that they cannot be watched.
-    reported: BTreeSet<PathBuf>,
-    wake: Arc<Notify>,
-}
-
-impl FolderWatch {
-    fn new(folders: BTreeSet<PathBuf>) -> Self {
-        let wake = Arc::new(Notify::new());
-        let waker = Arc::clone(&wake);
-        let watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
-            // Reading a file is an event too, and our own reading must not wake us.
-            if event.is_ok_and(|event| !event.kind.is_access()) {
-                waker.notify_one();
-            }
-        })
-        .inspect_err(|error| tracing::warn!(%error, "no watcher: files are read in turn"))
-        .ok();
-        Self {
-            watcher,
-            unwatched: folders,
-            reported: BTreeSet::new(),
-            wake,
-        }
-    }
-
-    /// Watches the folders that could not be watched so far.
-    fn renew(&mut self) {
-        let Some(watcher) = &mut self.watcher else {
-            return;
-        };
-        self.unwatched.retain(|folder| {
-            let watched = watcher.watch(folder, RecursiveMode::NonRecursive);
-            let Err(error) = watched else { return false };
-            // A folder that is not there is reported by whoever lists it.
-            if !matches!(error.kind, notify::ErrorKind::PathNotFound) && folder.is_dir() && self.reported.insert(folder.clone()) {
-                tracing::warn!(folder = %folder.display(), %error, "no watch: files are read in turn");
-            }
-            true
-        });
     }
 }

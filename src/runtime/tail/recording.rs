@@ -2,8 +2,10 @@
 
 use super::file::{Content, FileTail, read_at};
 use super::records::{self, HEADER_BYTES, MAGIC, NextRecord, RawMessage, RecordFault};
+use super::text::guarded;
 use crate::runtime::ingest::decode_message;
 use crate::runtime::log::is_logged;
+use std::error::Error;
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
@@ -49,7 +51,8 @@ impl FileTail {
         let mut header = [0; HEADER_BYTES];
         file.read_exact_at(&mut header, self.at)?;
         let length = records::footer(header);
-        let end = length.map(|length| body_at + length + MAGIC.len() as u64);
+        let end =
+            length.and_then(|length| body_at.checked_add(length)?.checked_add(MAGIC.len() as u64));
         if let Some(end) = end.filter(|end| size > *end) {
             let behind = size - end;
             self.refuse(&io::Error::other(format!(
@@ -103,20 +106,22 @@ impl FileTail {
     }
 
     fn take_message(&mut self, message: &RawMessage) {
-        match decode_message(message.channel(), message.publish_time, &message.payload) {
-            Ok(Some(item)) => {
+        let decode = || decode_message(message.channel(), message.publish_time, &message.payload);
+        let error: Box<dyn Error> = match guarded(decode) {
+            Ok(Ok(Some(item))) => {
                 self.refused_rows.end();
                 self.expect(item);
+                return;
             }
-            Ok(None) => {}
-            Err(error) => {
-                self.refused_rows.add(&error);
-                self.quarantined += 1;
-                let (file, total) = (self.path.display(), self.quarantined);
-                if is_logged(total) {
-                    tracing::warn!(%file, %error, total, "message quarantined");
-                }
-            }
+            Ok(Ok(None)) => return,
+            Ok(Err(error)) => error.into(),
+            Err(error) => error.into(),
+        };
+        self.refused_rows.add(&*error);
+        self.quarantined += 1;
+        let (file, total) = (self.path.display(), self.quarantined);
+        if is_logged(total) {
+            tracing::warn!(%file, %error, total, "message quarantined");
         }
     }
 }

@@ -98,6 +98,7 @@ impl Follower {
             .collect();
         let (mut moves, mut folders) = (Vec::new(), FolderNames::default());
         for (key, mut file) in gone {
+            self.at_work.comes_to(key.0);
             match self.outcome(&key, &mut file, &listing, &mut folders) {
                 GoneFile::Stays => {
                     self.files.insert(key, file);
@@ -116,12 +117,16 @@ impl Follower {
         }
         self.make_room();
         renamed.extend(self.first_names());
-        for key in listing.files.into_keys() {
-            if !self.files.contains_key(&key) {
-                tracing::info!(file = %key.1.display(), "followed");
-                let file = self.newly_followed(&key, &renamed);
-                self.files.insert(key, file);
-            }
+        let come = listing.files.into_keys();
+        let come: Vec<FileKey> = come.filter(|key| !self.files.contains_key(key)).collect();
+        if come.is_empty() {
+            return;
+        }
+        let known = self.known_before();
+        for key in come {
+            tracing::info!(file = %key.1.display(), "followed");
+            let file = self.newly_followed(&key, &renamed, &known);
+            self.files.insert(key, file);
         }
     }
 
@@ -252,6 +257,7 @@ impl Follower {
         let mut listing = Listing::default();
         for (index, source) in self.sources.iter_mut().enumerate() {
             let folder = source.pattern.folder();
+            self.at_work.comes_to(index);
             match list(&source.pattern, &source.decoder) {
                 Ok((files, not_text)) => {
                     self.unlisted.remove(folder);

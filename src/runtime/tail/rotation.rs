@@ -19,6 +19,15 @@ const LEFT_UNENDED: usize = 3;
 /// The first names of files that have been renamed, by their present ones.
 pub(super) type FirstNames = BTreeMap<FileKey, PathBuf>;
 
+/// What is known of the files that were followed before others came.
+#[derive(Debug, Default)]
+pub(super) struct KnownBefore {
+    /// Of the files that stood under a first name and have another by now, the one that was written to last.
+    latest: BTreeMap<FileKey, FileKey>,
+    /// The sources whose newest file has lines that are ended by the next one.
+    ends_later: BTreeSet<usize>,
+}
+
 impl Follower {
     /// The files that are followed now.
     pub(super) fn places(&self) -> BTreeSet<FileId> {
@@ -36,30 +45,52 @@ impl Follower {
             .collect()
     }
 
+    /// What is known of the files that are followed, for those that come.
+    pub(super) fn known_before(&self) -> KnownBefore {
+        let mut known = KnownBefore::default();
+        let mut newest: BTreeMap<usize, &FileTail> = BTreeMap::new();
+        for (key, file) in &self.files {
+            let of_source = newest.entry(key.0).or_insert(file);
+            if file.modified >= of_source.modified {
+                *of_source = file;
+            }
+            if file.origin != file.path {
+                let first = (key.0, file.origin.clone());
+                let latest = known.latest.entry(first).or_insert_with(|| key.clone());
+                if file.modified >= self.files[latest].modified {
+                    latest.clone_from(key);
+                }
+            }
+        }
+        let ends_later = |file: &FileTail| matches!(&file.content, Content::Text(text) if text.has_lines_ended_later());
+        let newest = newest.into_iter();
+        known.ends_later = newest
+            .filter(|(_, file)| ends_later(file))
+            .map(|(source, _)| source)
+            .collect();
+        known
+    }
+
     /// A file that is followed from here on. Where it is a renamed one, packed, it keeps the first name of that; where another one stood
     /// under its name before, what it holds without a header is read by the header of that.
-    pub(super) fn newly_followed(&self, key: &FileKey, renamed: &FirstNames) -> FileTail {
+    pub(super) fn newly_followed(
+        &self,
+        key: &FileKey,
+        renamed: &FirstNames,
+        known: &KnownBefore,
+    ) -> FileTail {
         let decoder = Arc::clone(&self.sources[key.0].decoder);
         let plain = is_packed(&key.1).then(|| unpacked_name(&key.1));
         let first = plain.and_then(|plain| renamed.get(&(key.0, plain)));
         let first = first.map_or_else(|| key.1.clone(), |name| packed(name));
         let mut file = FileTail::new(first, decoder);
         file.path.clone_from(&key.1);
-        let before = self
-            .files
-            .iter()
-            .filter(|((source, _), one)| *source == key.0 && one.origin == key.1);
-        let latest = before.max_by_key(|(_, one)| one.modified);
-        if let Some((_, latest)) = latest {
+        let latest = known.latest.get(key);
+        if let Some(latest) = latest.and_then(|latest| self.files.get(latest)) {
             file.header_before = latest.header();
             file.follow_on(&latest.content);
         }
-        let of_source = (self.files.iter()).filter(|((source, _), _)| *source == key.0);
-        let newest = of_source.max_by_key(|(_, one)| one.modified);
-        let is_known = newest.is_some_and(
-            |(_, one)| matches!(&one.content, Content::Text(text) if text.has_lines_ended_later()),
-        );
-        if is_known {
+        if known.ends_later.contains(&key.0) {
             file.expect_lines_ended_later();
         }
         file

@@ -231,11 +231,13 @@ impl TextReader {
 
 /// A mistake of the program while it read a line.
 #[derive(Debug, thiserror::Error)]
-#[error("the program failed while it read this line, which is passed over; please report it")]
-struct LineBroke;
+#[error(
+    "the program failed while it read this line or message, which is passed over; please report it"
+)]
+pub(in crate::runtime) struct LineBroke;
 
-/// What `work` gives: a line on which the program fails must not end the reading of all others, at each start anew.
-fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, LineBroke> {
+/// What `work` gives: a line or message on which the program fails must not end the reading of all others, at each start anew.
+pub(in crate::runtime) fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, LineBroke> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|_| LineBroke)
 }
 
