@@ -115,7 +115,7 @@ echo "ok: killed, started again by systemd, red as before and not notified of tw
 restarts=$(property NRestarts)
 inside systemctl kill --signal STOP --kill-who main slipwatch
 soon is_again || fail "a daemon that hangs was not started again"
-logged 'Watchdog timeout' || fail "not by the watchdog"
+soon logged 'Watchdog timeout' || fail "not by the watchdog"
 echo "ok: a daemon that hangs is ended by the watchdog and started again"
 
 process=$(property MainPID)

@@ -128,7 +128,7 @@ fn warn(section: &Section<'_>, policy: &Policy, evacuation_time: Option<&Placed<
             section.warning(
                 section.at(),
                 format!("the {name} threshold of {high} is below the one of {low}"),
-                "let a graver level begin at a larger figure",
+                "let a higher level begin at a larger figure",
             );
         }
     }
@@ -177,7 +177,7 @@ fn warn_of_unusual(section: &Section<'_>, policy: &Policy) {
 
 type ThresholdField = fn(&Threshold) -> Option<f64>;
 
-/// A level and a graver one that begins below it.
+/// A level and a higher one that begins below it.
 fn inverted(thresholds: &[Threshold], figure: ThresholdField) -> Option<(Level, Level)> {
     let mut pairs = thresholds
         .iter()

@@ -1,6 +1,6 @@
 //! Medians and quantiles of values that are finite numbers.
 
-use crate::reading;
+use crate::reading::{self, DEVIATION_PER_MEDIAN};
 
 /// The middle of `values`; 0 where there are none.
 pub(super) fn median(values: &[f64]) -> f64 {
@@ -31,7 +31,7 @@ pub(super) fn quantile(values: &[f64], share: f64) -> f64 {
 pub(super) fn robust_deviation(values: &[f64]) -> f64 {
     let middle = median(values);
     let distances: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
-    1.4826 * median(&distances)
+    DEVIATION_PER_MEDIAN * median(&distances)
 }
 
 /// The middle value, of an even number the upper one of both; 0 of none.

@@ -28,7 +28,9 @@ pub use figure::{counted, figure, shortest, whole_figure};
 pub use jiff::Timestamp;
 pub use line_fit::LineFit;
 pub use median::{upper_median, upper_median_by};
-pub use normal::{CHI_SQUARED_90, HALF_WIDTH_90, HALF_WIDTH_95, NORMAL_MEDIAN};
+pub use normal::{
+    CHI_SQUARED_90, DEVIATION_PER_MEDIAN, HALF_WIDTH_90, HALF_WIDTH_95, NORMAL_MEDIAN,
+};
 pub use plain::plain;
 pub use recording::{MergeError, Recording, SelectError};
 pub use resolution::rounding_error;

@@ -2,6 +2,8 @@
 
 /// The median size of a normal variable, in standard deviations.
 pub const NORMAL_MEDIAN: f64 = 0.6745;
+/// The standard deviation of a normal variable, in median sizes.
+pub const DEVIATION_PER_MEDIAN: f64 = 1.4826;
 /// Half the width of the interval that holds 90 % of a normal variable, in standard deviations.
 pub const HALF_WIDTH_90: f64 = 1.645;
 /// Half the width of the interval that holds 95 %.

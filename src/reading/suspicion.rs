@@ -1,6 +1,7 @@
 //! What in a benchmark's readings hardly means what was intended: a wrong unit, a wrong zone, a mark for no value, a
 //! reset that nobody declared.
 
+use super::normal::DEVIATION_PER_MEDIAN;
 use super::resolution::is_whole;
 use super::{Quantity, Timestamp, counted, figure, upper_median, whole_figure};
 use jiff::SignedDuration;
@@ -317,7 +318,7 @@ pub fn scatter_of(steps: &[f64]) -> Option<(f64, f64)> {
     } else {
         &moved
     };
-    let scatter = 1.4826 * median(steps.iter().map(|step| (step - usual).abs()))?;
+    let scatter = DEVIATION_PER_MEDIAN * median(steps.iter().map(|step| (step - usual).abs()))?;
     let scatter = scatter.max(median(steps.iter().map(|step| step.abs()))?);
     (scatter > 0.0).then_some((usual, scatter))
 }

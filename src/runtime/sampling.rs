@@ -157,14 +157,20 @@ fn left_behind(preview: &Preview) -> Vec<String> {
 fn unnamed_beside_a_broker(config: &Config) -> Option<String> {
     let files = config.sources.iter().map(|source| &source.id);
     let brokers = config.brokers.iter().map(|broker| &broker.id);
-    let sources: Vec<String> = files.chain(brokers).map(|id| format!("{id:?}")).collect();
+    let sources: Vec<&str> = files.chain(brokers).map(String::as_str).collect();
     let is_open = config.benchmarks.is_empty() && !config.brokers.is_empty();
     (is_open && sources.len() > 1).then(|| {
         format!(
             "no [[benchmark]] says which of the sources {} it comes from: where two of them give one name, their readings are taken as one series",
-            sources.join(" and ")
+            listed(sources)
         )
     })
+}
+
+/// `"a" and "b"`.
+fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let quoted: Vec<String> = names.into_iter().map(|one| format!("{one:?}")).collect();
+    quoted.join(" and ")
 }
 
 /// A line for each benchmark that comes from more than one source: what one instrument says would be mixed with what another does.
@@ -175,11 +181,10 @@ fn several_sources(preview: &Preview) -> Vec<String> {
     }
     let several = sources.into_iter().filter(|(_, sources)| sources.len() > 1);
     let lines = several.map(|(id, sources)| {
-        let sources: Vec<String> = sources.into_iter().map(|one| format!("{one:?}")).collect();
         format!(
             "benchmark {:?} comes from the sources {}, whose readings are taken as one series: name the one source in a [[benchmark]]",
             id.as_str(),
-            sources.join(" and ")
+            listed(sources)
         )
     });
     lines.collect()

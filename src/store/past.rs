@@ -161,8 +161,9 @@ impl Store {
         let mut values: Vec<Value> = Vec::new();
         while let Some(row) = rows.next()? {
             let value = value(row, wanted.is_reading)?;
-            let is_corrected = (values.last())
-                .is_some_and(|later| later.time == value.time && later.quantity == value.quantity);
+            let of_its_time = values.iter().rev();
+            let mut of_its_time = of_its_time.take_while(|later| later.time == value.time);
+            let is_corrected = of_its_time.any(|later| later.quantity == value.quantity);
             if !is_corrected {
                 values.push(value);
             }

@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn the_two_honest_ends_claim_no_effect() {
+    fn the_two_ends_without_an_effect_claim_none() {
         let none = text(&bare(Kind::NONE));
         assert!(
             none.starts_with("BLKM: the residual cannot be distinguished from noise"),
@@ -157,6 +157,7 @@ mod tests {
                 size: Some(12.0),
                 ..an_offset()
             },
+            also: Vec::new(),
             ..lake()
         };
         let said = text(&forward);

@@ -3,7 +3,7 @@
 use super::nature::Nature;
 use super::trace::{Trace, resolution};
 use crate::effects::quantiles::{median, robust_deviation};
-use crate::reading::Quantity;
+use crate::reading::{DEVIATION_PER_MEDIAN, Quantity};
 use std::ops::Range;
 
 /// Fewer readings show no neighbourhood.
@@ -192,7 +192,7 @@ fn stands_out(trace: &Trace, inside: Range<usize>, far: f64, usual: f64) -> bool
     let line = RobustLine::through(trace, &neighbours);
     let off = |index: usize| values[index] - line.at(trace.days[index]);
     let offs: Vec<f64> = neighbours.iter().map(|&index| off(index)).collect();
-    let deviation = usual.max(1.4826 * median(&absolute(&offs)));
+    let deviation = usual.max(DEVIATION_PER_MEDIAN * median(&absolute(&offs)));
     inside.into_iter().all(|index| {
         let own = off(index).abs();
         let beside = off(before).abs().max(off(after).abs());

@@ -28,7 +28,7 @@ const LOOK_AGAIN_MUTED: Duration = Duration::from_secs(1);
 const MOST_AT_ONCE: usize = 4;
 /// So many more of orange, and of red twice as many: runs for less that hang keep none of them waiting.
 const MORE_OF_SEVERE: usize = 2;
-/// A run that lasts longer than this does not keep a graver alert of its own benchmark waiting either, and is broken off for it. The run of an
+/// A run that lasts longer than this does not keep a more severe alert of its own benchmark waiting either, and is broken off for it. The run of an
 /// end does, but for red: it is then tried again.
 const KEEPS_WAITING: Duration = Duration::from_secs(10);
 
@@ -211,9 +211,9 @@ impl Worker {
         true
     }
 
-    /// Ends the runs for less at the place of a graver alert that does not wait for them any more: what they say would come after it.
-    fn break_off(&mut self, graver: &Alert) {
-        let is_there = |run: &mut Running| place(&run.waiting.alert) == place(graver);
+    /// Ends the runs for less at the place of a more severe alert that does not wait for them any more: what they say would come after it.
+    fn break_off(&mut self, severer: &Alert) {
+        let is_there = |run: &mut Running| place(&run.waiting.alert) == place(severer);
         let broken_off: Vec<Running> = self.running.extract_if(.., is_there).collect();
         for run in broken_off {
             let Waiting { alert, attempt, .. } = &run.waiting;

@@ -251,7 +251,7 @@ impl Site {
     }
 
     /// Has the only reading of a benchmark wait where this one, its second, lies far before it, and neither the time at the site
-    /// nor another benchmark is near to the first: with one wrong time stamp all honest readings would be late.
+    /// nor another benchmark is near to the first: with one wrong time stamp all true readings would be late.
     fn doubt_first(&mut self, arrival: &Arrival, host_time: Timestamp) -> Vec<Event> {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return Vec::new();
