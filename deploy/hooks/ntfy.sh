@@ -8,10 +8,10 @@ if [ $# -ne 1 ]; then
     exit 2
 fi
 cat >/dev/null
-# What is unknown ends no level.
-case "${SLIPWATCH_IN_FORCE:-$SLIPWATCH_LEVEL}/$SLIPWATCH_STATE" in
-red/firing) priority=5 ;;
-orange/firing | unknown/firing) priority=4 ;;
+# What is unknown ends no red that is in force beside it.
+case "$SLIPWATCH_LEVEL/$SLIPWATCH_STATE/${SLIPWATCH_IN_FORCE:-}" in
+red/firing/* | unknown/firing/red) priority=5 ;;
+orange/firing/* | unknown/firing/*) priority=4 ;;
 *) priority=3 ;;
 esac
 # One line, whatever a benchmark is called.

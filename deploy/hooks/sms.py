@@ -118,9 +118,9 @@ def message(environment, alert):
     words.append(f"{environment['SLIPWATCH_SITE']}, {place}.")
     zone = environment.get("SLIPWATCH_TIME_ZONE") or "UTC"
     in_force = environment.get("SLIPWATCH_IN_FORCE")
-    if in_force:
+    if in_force in ("red", "orange"):
         # What is unknown ends no level.
-        words.append(f"{in_force.upper()} STAYS IN FORCE: {TO_DO.get(in_force, 'watch the slope')}.")
+        words.append(f"{in_force.upper()} STAYS IN FORCE: {TO_DO[in_force]}.")
     elif state == "firing" and level in TO_DO:
         words.append(f"{TO_DO[level]}.")
     if state == "resolved" and level in ("red", "orange"):
