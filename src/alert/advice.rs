@@ -29,9 +29,7 @@ impl Level {
             }
         }
     }
-}
 
-impl Level {
     /// The same where the level `beside` it is in force at the benchmark: what is `unknown` ends none.
     pub fn recommended_beside(self, beside: Option<Self>) -> &'static str {
         match (self, beside) {

@@ -1,6 +1,6 @@
 //! Benchmarks of the config that have given no reading yet: unknown until they do.
 
-use super::event::{AlertState, Event, EventKind, SITE};
+use super::event::{AlertState, Event, EventKind, alert_key};
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
@@ -55,21 +55,11 @@ impl Awaited {
     }
 }
 
-/// Not that of the whole site where the benchmark bears its name.
-fn key(benchmark: &BenchmarkId, since: Timestamp) -> String {
-    let level = Level::Unknown;
-    if benchmark.as_str() == SITE {
-        format!("{benchmark}/{level}/1/{since}")
-    } else {
-        format!("{benchmark}/{level}/{since}")
-    }
-}
-
 fn alert(benchmark: &BenchmarkId, since: Timestamp, state: AlertState, text: String) -> EventKind {
     EventKind::Alert {
         level: Level::Unknown,
         state,
-        key: key(benchmark, since),
+        key: alert_key(benchmark, Level::Unknown, 0, since),
         rule: "no-data".to_owned(),
         text,
     }

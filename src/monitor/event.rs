@@ -206,6 +206,21 @@ pub const REMOVED: &str = "removed";
 
 /// What the keys of alerts of the whole site begin with.
 pub(super) const SITE: &str = "site";
+
+/// The key of a benchmark's alert in force since `since`, whose readings have been dropped so often: no other one of this benchmark has it, an earlier
+/// one of the same readings neither, nor one of the whole site where the benchmark bears its name.
+pub(super) fn alert_key(
+    benchmark: &BenchmarkId,
+    level: Level,
+    dropped: u32,
+    since: Timestamp,
+) -> String {
+    match dropped {
+        0 if benchmark.as_str() != SITE => format!("{benchmark}/{level}/{since}"),
+        times => format!("{benchmark}/{level}/{}/{since}", times.saturating_add(1)),
+    }
+}
+
 /// How the kind of a fault begins that says a suspicion of readings, and how that of its end ends.
 pub const SUSPECT: &str = "suspect-";
 /// The kind of a fault that says that a reset was found which nobody declared.

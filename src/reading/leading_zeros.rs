@@ -5,6 +5,14 @@ use std::borrow::Cow;
 /// `text` with zeros before the digits of parts that nothing separates, as many as `pattern` writes: `2026 61 115` is `2026 61 0115` for
 /// `%Y %j %H%M`. Loggers leave them out, and the first two digits of 115 are no hour.
 pub(super) fn with_leading_zeros<'a>(pattern: &str, text: &'a str) -> Cow<'a, str> {
+    // Asked for each time of a table: most patterns separate their parts.
+    if !pattern
+        .as_bytes()
+        .windows(3)
+        .any(|three| three[0] == b'%' && three[2] == b'%')
+    {
+        return text.into();
+    }
     let Some(widths) = digits_together(pattern) else {
         return text.into();
     };

@@ -1,7 +1,7 @@
 //! Whether the config file as it is now is in force: kept in the state folder, for those who ask the state.
 
 use super::kept;
-use super::tail::{Decoder, list};
+use super::tail::{Decoder, does_not_answer, list};
 use crate::config::{Benchmark, Config, FileSource};
 use crate::reading::Timestamp;
 use schemars::JsonSchema;
@@ -56,8 +56,8 @@ pub fn sources_without_files(config: &Config) -> Vec<String> {
         if let Ok(line) = listed.recv_timeout(ANSWERS_WITHIN) {
             lines.extend(line);
         } else {
-            let (id, folder) = (&source.id, source.pattern.folder().display());
-            lines.push(format!("source {id:?}: the folder {folder} does not answer (a network's share whose server is away?)"));
+            let what = does_not_answer(source.pattern.folder());
+            lines.push(format!("source {:?}: the folder {what}", source.id));
             break;
         }
     }

@@ -39,7 +39,7 @@ struct Listening {
 }
 
 impl Listening {
-    /// Listens until it is told to stop, also where the program fails meanwhile: it then begins anew.
+    /// Listens until it is asked to stop, also where the program fails meanwhile: it then begins anew.
     async fn keep_on(mut self) {
         let follow = |one: &Self| {
             tokio::spawn(mqtt::follow(

@@ -232,7 +232,7 @@ impl Store {
         Ok(counts)
     }
 
-    /// What people have asked for and the daemon has not taken yet.
+    /// What people have asked for and the daemon has not taken yet. What cannot be read of it is deleted.
     ///
     /// # Errors
     /// [`StoreError`].

@@ -341,68 +341,51 @@ fn a_year_of_two_digits_in_front_is_read_as_such_or_asked_about() {
     }
 }
 
-/// As Campbell's array files have it: 115 is 01:15; and hours from 1 to 24.
-#[test]
-fn a_time_without_its_leading_zeros_is_the_one_that_was_written_and_hour_24_ends_the_day() {
-    let body: Vec<String> = (0..96)
-        .map(|quarter| {
-            let minutes = 15 * quarter;
-            let time = 100 * (minutes / 60) + minutes % 60;
-            format!("2026,61,{time},{}\n", f64::from(quarter) * 0.01)
-        })
+/// What `init` says of a table whose columns have times of this format.
+fn said_of_times(columns: &[&str], format: &str, times: impl Iterator<Item = String>) -> String {
+    let rows = times.zip(0..);
+    let rows: Vec<String> = rows
+        .map(|(time, row)| format!("{time},{}\n", f64::from(row) * 0.01))
         .collect();
-    let text = format!("Year,Day,HHMM,Ext1_displacement_mm\n{}", body.concat());
-    let office = Office::with(&[("a.csv", &text)]);
+    let header = format!("{},Ext1_displacement_mm\n", columns.join(","));
+    let office = Office::with(&[("a.csv", &(header + &rows.concat()))]);
     let args = [
         "init",
         "a.csv",
         "--time-zone",
         "UTC",
-        "--time-column",
-        "Year",
-        "--time-column",
-        "Day",
+        "--time-format",
+        format,
     ];
-    let args = [
-        &args[..],
-        &["--time-column", "HHMM", "--time-format", "%Y %j %H%M"],
-    ]
-    .concat();
+    let columns = columns.iter().flat_map(|column| ["--time-column", *column]);
+    let args: Vec<&str> = args.into_iter().chain(columns).collect();
     let (exit, out, err) = office.say(&args);
     assert_eq!(exit, 0, "{out}{err}");
+    out
+}
+
+/// As Campbell's array files have it: 115 is 01:15; and hours from 1 to 24.
+#[test]
+fn a_time_without_its_leading_zeros_is_the_one_that_was_written_and_hour_24_ends_the_day() {
+    let quarters = (0..96).map(|quarter| {
+        let minutes = 15 * quarter;
+        format!("2026,61,{}", 100 * (minutes / 60) + minutes % 60)
+    });
+    let said = said_of_times(&["Year", "Day", "HHMM"], "%Y %j %H%M", quarters);
     for part in [
         "96 readings",
         "2026-03-02T00:00:00Z",
         "2026-03-02T23:45:00Z",
     ] {
-        assert!(out.contains(part), "no {part:?} in {out}{err}");
+        assert!(said.contains(part), "no {part:?} in {said}");
     }
-    let body: Vec<String> = (1..=48)
-        .map(|hour| {
-            let (day, hour) = ((hour - 1) / 24 + 1, (hour - 1) % 24 + 1);
-            format!("{day:02}.03.2026,{hour},{}\n", f64::from(hour) * 0.01)
-        })
-        .collect();
-    let text = format!("Date,Hour,Ext1_displacement_mm\n{}", body.concat());
-    let office = Office::with(&[("a.csv", &text)]);
-    let args = [
-        "init",
-        "a.csv",
-        "--time-zone",
-        "UTC",
-        "--time-column",
-        "Date",
-        "--time-column",
-        "Hour",
-    ];
-    let args = [&args[..], &["--time-format", "%d.%m.%Y %H"]].concat();
-    let (exit, out, err) = office.say(&args);
-    assert_eq!(exit, 0, "{out}{err}");
+    let hours = (0..48).map(|hour| format!("{:02}.03.2026,{}", hour / 24 + 1, hour % 24 + 1));
+    let said = said_of_times(&["Date", "Hour"], "%d.%m.%Y %H", hours);
     for part in [
         "48 readings",
         "2026-03-01T01:00:00Z",
         "2026-03-03T00:00:00Z",
     ] {
-        assert!(out.contains(part), "no {part:?} in {out}{err}");
+        assert!(said.contains(part), "no {part:?} in {said}");
     }
 }

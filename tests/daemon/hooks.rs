@@ -458,14 +458,20 @@ async fn a_red_is_reported_before_everything_that_waits_for_a_slow_hook() {
     assert!(dispatcher.close(LIMIT).await.is_some());
 }
 
-/// Runs for unknown that hang, of as many benchmarks as run at a time, and one for orange at the benchmark that turns red.
-#[tokio::test]
-async fn a_red_waits_for_no_run_of_a_lesser_alert_that_hangs() {
-    let script = "echo \"$SLIPWATCH_BENCHMARK $SLIPWATCH_LEVEL\" >> calls; [ $SLIPWATCH_LEVEL = red ] || exec sleep 600";
+/// A hook that is asked for each level but green, and whose runs may last a quarter of an hour.
+fn with_runs_that_hang(script: &str) -> (TempDir, Dispatcher) {
     let (folder, mut config) = hook(script);
     config.levels.push(Level::Unknown);
     config.timeout = Duration::from_secs(900);
     let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
+    (folder, dispatcher)
+}
+
+/// Runs for unknown that hang, of as many benchmarks as run at a time, and one for orange at the benchmark that turns red.
+#[tokio::test]
+async fn a_red_waits_for_no_run_of_a_lesser_alert_that_hangs() {
+    let script = "echo \"$SLIPWATCH_BENCHMARK $SLIPWATCH_LEVEL\" >> calls; [ $SLIPWATCH_LEVEL = red ] || exec sleep 600";
+    let (folder, dispatcher) = with_runs_that_hang(script);
     let offer = |benchmark, level| {
         assert!(dispatcher.offer(&alert_at(benchmark, level, AlertState::Firing)));
     };
@@ -496,10 +502,7 @@ async fn a_red_waits_for_no_run_of_a_lesser_alert_that_hangs() {
 #[tokio::test]
 async fn a_red_waits_for_no_run_for_orange_or_for_the_end_of_unknown_that_hangs() {
     let script = "echo \"$SLIPWATCH_BENCHMARK $SLIPWATCH_LEVEL $SLIPWATCH_STATE\" >> calls; [ $SLIPWATCH_LEVEL = red ] || exec sleep 600";
-    let (folder, mut config) = hook(script);
-    config.levels.push(Level::Unknown);
-    config.timeout = Duration::from_secs(900);
-    let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
+    let (folder, dispatcher) = with_runs_that_hang(script);
     let offer = |benchmark, level, state| {
         assert!(dispatcher.offer(&alert_at(benchmark, level, state)));
     };

@@ -172,13 +172,17 @@ fn answering(status: &'static str) -> (String, thread::JoinHandle<String>) {
 #[test]
 #[cfg_attr(not(has_curl), ignore = "curl was not found by build.rs")]
 fn a_push_message_has_the_priority_of_the_level_and_a_server_that_refuses_it_is_a_failure() {
-    for (said, priority) in [
-        (RED, "Priority: 5"),
-        (("unknown", "firing", "Actual"), "Priority: 4"),
-        (("red", "resolved", "Test"), "Priority: 3"),
+    // What is unknown ends no level that is in force beside it.
+    for (said, beside, priority) in [
+        (RED, "", "Priority: 5"),
+        (("unknown", "firing", "Actual"), "", "Priority: 4"),
+        (("unknown", "firing", "Actual"), "yellow", "Priority: 4"),
+        (("unknown", "firing", "Actual"), "red", "Priority: 5"),
+        (("red", "resolved", "Test"), "", "Priority: 3"),
     ] {
         let (url, got) = answering("200 OK");
-        let output = run("ntfy.sh", &[&url], said, &[]);
+        let in_force = [("SLIPWATCH_IN_FORCE", Path::new(beside))];
+        let output = run("ntfy.sh", &[&url], said, &in_force);
         assert!(output.status.success(), "{output:?}");
         let got = got.join().unwrap();
         assert!(got.starts_with("POST /monte-toc HTTP/1.1\r\n"), "{got}");
@@ -191,7 +195,12 @@ fn a_push_message_has_the_priority_of_the_level_and_a_server_that_refuses_it_is_
             if said.2 == "Test" { "TEST: " } else { "" },
             said.0.to_uppercase(),
         );
-        let title = format!("Title: {mark}{level} {state}: Monte Toc, 5Bcc: all@example.org\r\n");
+        let beside = match beside {
+            "" => String::new(),
+            level => format!(", {level} stays in force"),
+        };
+        let title =
+            format!("Title: {mark}{level} {state}: Monte Toc, 5Bcc: all@example.org{beside}\r\n");
         let text = if said.1 == "firing" {
             "\r\n\r\nEvacuate the area. At 2017-06-06 19:00 CEST; collapse forecast (median) 2017-06-07 05:00 CEST; benchmark 5"
         } else {

@@ -1,6 +1,7 @@
 //! File systems that do not answer. A share whose server is away cannot be had here: a library in front of the system's makes the daemon's
 //! calls wait as that does.
 
+use crate::machine::of;
 use crate::site::{Program, Site, command, eventually};
 use crate::telling::failing;
 use nix::sys::signal::Signal;
@@ -27,11 +28,6 @@ fn start(site: &Site) -> Program {
     let library = format!("LD_PRELOAD={}", site.path("hanging.so").display());
     let away = format!("AWAY={}", site.path("away").display());
     site.start(&["env", &library, &away])
-}
-
-fn of(site: &Site, benchmark: &str) -> usize {
-    let values = site.values();
-    values.iter().filter(|(name, ..)| name == benchmark).count()
 }
 
 #[test]

@@ -20,7 +20,7 @@ fn rows(days: std::ops::Range<u32>) -> String {
 }
 
 /// Values of a benchmark that stand in the state.
-fn of(site: &Site, benchmark: &str) -> usize {
+pub(crate) fn of(site: &Site, benchmark: &str) -> usize {
     let values = site.values();
     values.iter().filter(|(name, ..)| name == benchmark).count()
 }

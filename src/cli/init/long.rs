@@ -11,7 +11,7 @@ const FILLED_PERCENT: usize = 90;
 /// Names that are shown.
 const SHOWN: usize = 3;
 /// Words that a column of names may begin with, one of the words in its name.
-const OF_POINTS: [&str; 23] = [
+const OF_POINTS: [&str; 22] = [
     "benchmark",
     "node",
     "device",
@@ -21,7 +21,6 @@ const OF_POINTS: [&str; 23] = [
     "capteur",
     "sonde",
     "sonda",
-    "prisma",
     "messstelle",
     "extenso",
     "point",

@@ -73,9 +73,9 @@ pub(super) fn without_readings(
         None if stated.is_some_and(|stated| stated.contains('/')) => {
             ("velocity", "UNIT".to_owned())
         }
-        None if stated.is_some() => ("displacement", "UNIT".to_owned()),
-        None if first.contains("_per_") || first.contains('/') => ("velocity", "UNIT".to_owned()),
-        None if first.contains(['_', '[', '(']) => ("displacement", "UNIT".to_owned()),
+        None if stated.is_none() && (first.contains("_per_") || first.contains('/')) => {
+            ("velocity", "UNIT".to_owned())
+        }
         None => ("displacement", "UNIT".to_owned()),
     };
     let example = format!("{first}=P1:{quantity}:{unit}");

@@ -26,7 +26,7 @@ pub(super) fn is_severe(alert: &Alert) -> bool {
 
 /// Whether red is called.
 pub(super) fn is_red(alert: &Alert) -> bool {
-    alert.level == Level::Red && alert.state == MessageState::Firing
+    severity(alert) >= 5
 }
 
 /// What is reported by one run at a time, so that its order stays.

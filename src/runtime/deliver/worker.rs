@@ -298,8 +298,15 @@ impl Worker {
         } else if self.is_over(&waiting.alert) {
             self.drop_over(&waiting.alert);
         } else if open && goes_on {
-            tracing::warn!(hook, key, attempt, ?outcome, "hook will be retried");
-            self.try_again(&waiting.alert, attempt);
+            let delay_s = self.try_again(&waiting.alert, attempt).as_secs_f64();
+            tracing::warn!(
+                hook,
+                key,
+                attempt,
+                ?outcome,
+                delay_s,
+                "hook will be retried"
+            );
         } else {
             self.lost += 1;
             let outcome = if open {
@@ -314,13 +321,9 @@ impl Worker {
         }
     }
 
-    fn try_again(&mut self, alert: &Alert, attempt: u32) {
+    /// Has it wait for its next attempt: for how long.
+    fn try_again(&mut self, alert: &Alert, attempt: u32) -> Duration {
         let delay = self.retry.delay(&alert.key, attempt);
-        tracing::debug!(
-            alert.key,
-            delay_s = delay.as_secs_f64(),
-            "waits for its next attempt"
-        );
         self.note(alert, DeliveryOutcome::Waiting);
         let again = Waiting {
             alert: alert.clone(),
@@ -330,6 +333,7 @@ impl Worker {
             is_held: false,
         };
         self.wait(again, clock::later(delay));
+        delay
     }
 
     /// A hook that fails is shown as such until it takes an alert.

@@ -227,17 +227,12 @@ impl FileTail {
             self.valueless = 0;
             return;
         }
-        let is_recording = matches!(self.content, Content::Mcap { .. });
-        self.valueless += match self.content {
-            Content::Packed(_) => READ_BYTES as u64,
-            Content::Text(_) | Content::Mcap { .. } | Content::Refused(_) | Content::Complete => {
-                self.at.saturating_sub(before)
-            }
+        self.valueless += if matches!(self.content, Content::Packed(_)) {
+            READ_BYTES as u64
+        } else {
+            self.at.saturating_sub(before)
         };
-        if is_recording {
-            return;
-        }
-        if self.valueless > REFUSED_BYTES {
+        if self.valueless > REFUSED_BYTES && !matches!(self.content, Content::Mcap { .. }) {
             self.valueless = 0;
             let error = format!("{REFUSED_BYTES} bytes without a value");
             self.refuse(&io::Error::other(error));

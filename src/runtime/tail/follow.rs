@@ -75,13 +75,14 @@ pub struct Follower {
     /// Runs since the last look at the files.
     looked: Option<Stopwatch>,
     /// The files held no more once: what comes since is live, but for the backlog of one or another.
-    is_live: bool,
+    pub(super) is_live: bool,
     /// Positions that are to be kept, or forgotten, whatever still waits.
     pub(super) at_once: Vec<Position>,
     /// What may be missing of files that are gone.
     pub(super) lost: Vec<Arrival>,
     /// Files whose names are no text, as they were reported.
     pub(super) not_text: BTreeSet<PathBuf>,
+    /// Which source is being read.
     pub(super) at_work: AtWork,
 }
 
@@ -132,22 +133,6 @@ impl Follower {
             not_text: BTreeSet::new(),
             at_work: AtWork::default(),
         }
-    }
-
-    /// Which source is being read.
-    pub(super) fn at_work(&self) -> &AtWork {
-        &self.at_work
-    }
-
-    /// The folders of the sources, by their numbers.
-    pub(super) fn folders(&self) -> Vec<PathBuf> {
-        let folders = self.sources.iter().map(|source| source.pattern.folder());
-        folders.map(Path::to_owned).collect()
-    }
-
-    /// Whether all files have held no more before: what comes is live.
-    pub(super) fn goes_on_live(&mut self, is_live: bool) {
-        self.is_live = is_live;
     }
 
     /// Whether there is a file of this source.

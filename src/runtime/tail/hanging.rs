@@ -21,6 +21,12 @@ const MOST_DOUBLINGS: u32 = 3;
 /// How often it is looked at how far the reading is.
 const LOOKED_AT: Duration = Duration::from_millis(500);
 
+/// That a folder does not answer, in words.
+pub(in crate::runtime) fn does_not_answer(folder: &Path) -> String {
+    let folder = folder.display();
+    format!("{folder} does not answer (a network's share whose server is away?)")
+}
+
 /// Those who read the files, and watch their folders.
 #[derive(Debug)]
 pub(super) struct Readers {
@@ -75,21 +81,31 @@ impl FollowedFiles {
         }
     }
 
+    fn is_left_out(&self, id: &str) -> bool {
+        let mut all = self.left_out.iter().flat_map(|one| &one.sources);
+        all.any(|source| source == id)
+    }
+
+    /// The sources that answer, in the order of the readers' numbers.
+    fn answering(&self) -> impl Iterator<Item = &FileSource> {
+        let sources = self.sources.iter();
+        sources.filter(|source| !self.is_left_out(&source.id))
+    }
+
     /// Readers of all sources that answer.
     pub(super) fn readers(&self) -> Readers {
-        let is_out = |id: &str| {
-            let mut all = self.left_out.iter().flat_map(|one| &one.sources);
-            all.any(|source| source == id)
+        let sources: Vec<FileSource> = self.answering().cloned().collect();
+        let is_read = |name: &str| {
+            !name
+                .split_once(':')
+                .is_some_and(|(id, _)| self.is_left_out(id))
         };
-        let sources = self.sources.iter().filter(|source| !is_out(&source.id));
-        let sources: Vec<FileSource> = sources.cloned().collect();
-        let of_others = |name: &str| !is_out(name.split_once(':').map_or(name, |(id, _)| id));
-        let saved = self.positions.iter().filter(|(name, _)| of_others(name));
+        let saved = self.positions.iter().filter(|(name, _)| is_read(name));
         let saved: Vec<(String, Vec<u8>)> = saved
             .map(|(name, body)| (name.clone(), body.clone()))
             .collect();
         let mut follower = Follower::new(&sources, &self.benchmarks, &saved);
-        follower.goes_on_live(self.was_live);
+        follower.is_live = self.was_live;
         let folders = sources.iter().enumerate();
         let folders = folders.map(|(index, one)| (one.pattern.folder().to_owned(), index));
         Readers {
@@ -103,15 +119,14 @@ impl FollowedFiles {
     /// # Errors
     /// When the reading broke off.
     pub(super) async fn look(&mut self, readers: Box<Readers>) -> Result<Looked, JoinError> {
-        let at_work = readers.follower.at_work().clone();
-        let folders = readers.follower.folders();
+        let at_work = readers.follower.at_work.clone();
         let (sender, mut read) = tokio::sync::oneshot::channel();
         let reading = spawn_blocking(move || {
             let Readers {
                 mut follower,
                 mut watch,
             } = *readers;
-            watch.renew(follower.at_work());
+            watch.renew(&follower.at_work);
             let batch = follower.poll(clock::now());
             let readers = Box::new(Readers { follower, watch });
             // Nobody waits for one that took too long: what it read is read again.
@@ -133,9 +148,13 @@ impl FollowedFiles {
             let now = at_work.steps();
             if now != steps {
                 (steps, since) = (now, Stopwatch::start());
-            } else if let Some(folder) = folders.get(at_work.source())
-                && since.elapsed() >= self.longest(folder)
-            {
+                continue;
+            }
+            let source = self.answering().nth(at_work.source());
+            let Some(folder) = source.map(|one| one.pattern.folder().to_owned()) else {
+                continue;
+            };
+            if since.elapsed() >= self.longest(&folder) {
                 self.leave_out(folder, reading);
                 return Ok(Looked::Hangs);
             }
@@ -159,15 +178,15 @@ impl FollowedFiles {
         first * 2_u32.pow(count.min(MOST_DOUBLINGS))
     }
 
-    fn leave_out(&mut self, folder: &Path, reading: JoinHandle<()>) {
+    fn leave_out(&mut self, folder: PathBuf, reading: JoinHandle<()>) {
         tracing::error!(folder = %folder.display(), "does not answer: the other sources are read without it");
-        let again = (self.count(folder) + 1, Stopwatch::start());
-        self.counts.insert(folder.to_owned(), again);
+        let again = (self.count(&folder) + 1, Stopwatch::start());
+        self.counts.insert(folder.clone(), again);
         let sources = self.sources.iter();
         let sources = sources.filter(|source| source.pattern.folder() == folder);
         self.left_out.push(LeftOut {
             sources: sources.map(|source| source.id.clone()).collect(),
-            folder: folder.to_owned(),
+            folder,
             reading,
         });
     }
@@ -203,15 +222,13 @@ impl FollowedFiles {
     /// The folders that do not answer.
     pub(super) fn faults(&self) -> impl Iterator<Item = (FaultPlace, String)> {
         self.left_out.iter().map(|one| {
-            let folder = one.folder.display();
             let place = FaultPlace {
                 kind: ServiceFaultKind::FolderUnreadable,
                 source: one.sources.first().cloned(),
-                what: folder.to_string(),
+                what: one.folder.display().to_string(),
             };
-            let text = format!(
-                "{folder} does not answer (a network's share whose server is away?): it is not read until it does; the other sources are"
-            );
+            let what = does_not_answer(&one.folder);
+            let text = format!("{what}: it is not read until it does; the other sources are");
             (place, text)
         })
     }

@@ -32,6 +32,7 @@ pub(super) use decode::Decoder;
 pub use decode::{Arrival, is_taken, options_of};
 pub use follow::{ArrivalBatch, Follower};
 pub use hanging::FollowedFiles;
+pub(super) use hanging::does_not_answer;
 pub use known::KnownFiles;
 pub use reorder::WaitingReading;
 pub(super) use rescan::list;
@@ -84,7 +85,10 @@ pub async fn follow(
             }
             Looked::Hangs => {
                 readers = Box::new(files.readers());
-                faults.are_of_files(files.faults());
+                // Those of other files last until these have been read again.
+                for (place, text) in files.faults() {
+                    faults.lasts(place, &text);
+                }
                 if shutdown.is_requested() {
                     return Ok(());
                 }

@@ -7,7 +7,7 @@ mod set_back;
 use crate::alert::Level;
 use crate::fit::{Observations, Rate};
 use crate::monitor::declared::Declarations;
-use crate::monitor::event::{Event, EventKind, SITE};
+use crate::monitor::event::{Event, EventKind, alert_key};
 use crate::monitor::history::{History, MeasuredAs, Taken};
 use crate::monitor::silence::Silence;
 use crate::reading::{BenchmarkId, Quantity, Reading, Timestamp, Unit, days_of};
@@ -111,14 +111,9 @@ impl BenchmarkRecord {
         self.dropped
     }
 
-    /// The key of an alert in force since `since`: no other one of this benchmark has it, an earlier one of the same readings
-    /// neither, nor one of the whole site where the benchmark bears its name.
+    /// The key of an alert in force since `since`.
     pub(super) fn alert_key(&self, level: Level, since: Timestamp) -> String {
-        let benchmark = &self.benchmark;
-        match self.dropped {
-            0 if benchmark.as_str() != SITE => format!("{benchmark}/{level}/{since}"),
-            times => format!("{benchmark}/{level}/{}/{since}", times.saturating_add(1)),
-        }
+        alert_key(&self.benchmark, level, self.dropped, since)
     }
 
     /// The time of what follows from a reading of `time`: data time does not go back.
