@@ -67,12 +67,12 @@ const OF_LATE: i32 = 2;
 /// The next reading is taken to be no further away than this.
 const FARTHEST_READING: SignedDuration = SignedDuration::from_hours(30 * 24);
 
-/// `span`, counted from the next reading of those that are `interval_days` apart: what this one does not call, that one may,
-/// and people act then.
-pub fn to_the_next_reading(span: SignedDuration, interval_days: f64) -> SignedDuration {
-    let interval = SignedDuration::try_from_secs_f64(interval_days * SECONDS_PER_DAY);
-    let interval = interval.unwrap_or_default();
-    span.saturating_add(interval.min(FARTHEST_READING))
+/// `span`, counted from the next reading, which is `to_next_days` away: what this one does not call, that one may, and people act
+/// then.
+pub fn to_the_next_reading(span: SignedDuration, to_next_days: f64) -> SignedDuration {
+    let to_next = SignedDuration::try_from_secs_f64(to_next_days * SECONDS_PER_DAY);
+    let to_next = to_next.unwrap_or_default();
+    span.saturating_add(to_next.min(FARTHEST_READING))
 }
 
 /// The chance whose odds are so many times those of `chance`.

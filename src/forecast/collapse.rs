@@ -126,9 +126,9 @@ impl Indicators {
         })
     }
 
-    /// Median of the newest spans between readings, days.
-    pub fn interval_days(&self) -> f64 {
-        self.scales.interval_days
+    /// From the newest reading to the next one, as the newest few spans have it, days.
+    pub fn to_next_days(&self) -> f64 {
+        self.scales.to_next_days
     }
 
     /// The most that levels may be given of a chance within `days`, whatever is expected.

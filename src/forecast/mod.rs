@@ -5,6 +5,7 @@ mod dependence;
 mod evidence;
 mod excursions;
 mod free_exponent;
+mod intervals;
 mod isolated_step;
 mod law_passages;
 mod learned;

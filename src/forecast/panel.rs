@@ -34,8 +34,8 @@ pub struct Outlook {
     pub passage: Passage,
     /// Probability that the slope accelerates, against steady motion under its usual fluctuations.
     pub accelerating: f64,
-    /// Between the newest readings, days.
-    pub interval_days: f64,
+    /// From the newest reading to the next one, as the newest few spans have it, days.
+    pub to_next_days: f64,
     /// How much less likely the newest reading was than usual, ln, where that stands out.
     pub surprise_nats: Option<f64>,
     /// Probability of each regime.
@@ -190,7 +190,7 @@ pub(crate) fn outlook(
         expected: collapse.expected,
         chances: collapse.sure,
         accelerating,
-        interval_days: indicators.interval_days(),
+        to_next_days: indicators.to_next_days(),
         surprise_nats: None,
         regimes: posterior
             .as_ref()
@@ -249,7 +249,7 @@ impl Outlook {
             collapse: self.collapse.sooner(pace),
             expected: self.expected.sooner(pace),
             chances: self.chances.sooner(pace),
-            interval_days: self.interval_days / pace,
+            to_next_days: self.to_next_days / pace,
             ..self
         }
     }

@@ -4,10 +4,12 @@
 //! A forecast rests on the newest velocity and the newest change of each scale, and on how large such changes were
 //! before: a change that is usual for the instrument or for the slope is no evidence of anything.
 
+use super::intervals::Intervals;
 use super::past_event::{LEAST_CHANGE_MM, PastEvent, median, past_events};
-use super::sessions::{SPANS, merged};
-use crate::fit::{Observation, Observations, velocity_sigma};
+use super::sessions::merged;
+use crate::fit::{Observation, Observations, displacement_sigma, velocity_sigma};
 use crate::reading::Quantity;
+use std::cell::LazyCell;
 
 /// No block is shorter, days: a quarter of an hour.
 const FINEST_BLOCK_DAYS: f64 = 1.0 / 96.0;
@@ -18,9 +20,6 @@ const MOST_SCALES: usize = 24;
 pub(super) const FEWEST_BLOCKS: usize = 3;
 /// Fewest readings.
 const FEWEST_READINGS: usize = 6;
-/// So many of the newest spans between readings say how a slope is read now, where they are shorter than this share of the usual one.
-const SPANS_NOW: usize = 24;
-const OFTENER: f64 = 0.25;
 /// The usual change of the next shorter scale counts as much as so many observed ones.
 const PRIOR_COUNT: f64 = 2.0;
 /// Changes of neighbouring blocks overlap: so many of them are worth one that is independent.
@@ -70,6 +69,8 @@ pub struct Scales {
     pub base_days: f64,
     /// Median of the newest spans between readings, or between sessions of them, days.
     pub interval_days: f64,
+    /// From the newest reading to the next one, as the newest few spans have it, days.
+    pub to_next_days: f64,
     /// From the first reading to the newest, days.
     pub length_days: f64,
     /// Half of the span over which a velocity is the mean: so long before its time stamp it is centred, days.
@@ -125,7 +126,8 @@ impl Scales {
         }
         let values = &*merged(values);
         let curve = Curve::of(observations.quantity, observations.averaging_days, values);
-        let interval_days = curve.interval();
+        let intervals = Intervals::of(&curve.days);
+        let interval_days = intervals.now;
         let base_days = interval_days.max(FINEST_BLOCK_DAYS);
         let noise = ReadingNoise::of(observations, values, interval_days);
         let mut each: Vec<Scale> = Vec::new();
@@ -147,9 +149,13 @@ impl Scales {
                 usual = usual.max(is_usual);
             }
         }
+        if observations.quantity == Quantity::Displacement {
+            curve.count_fewer(intervals, values, &mut each);
+        }
         (!each.is_empty()).then_some(Self {
             base_days,
             interval_days,
+            to_next_days: intervals.to_next,
             length_days: -curve.days[0],
             centred_before_days: 0.5 * observations.averaging_days,
             each,
@@ -219,12 +225,25 @@ impl Curve {
         }
     }
 
-    fn interval(&self) -> f64 {
-        let spans = self.days.windows(2).rev().map(|pair| pair[1] - pair[0]);
-        let mut spans: Vec<f64> = spans.take(SPANS).collect();
-        let mut now = spans[..spans.len().min(SPANS_NOW)].to_vec();
-        let (usual, now) = (median(&mut spans), median(&mut now));
-        if now < OFTENER * usual { now } else { usual }
+    /// The usual changes of displacements with what the newest blocks have of noise because they hold fewer readings than those before.
+    fn count_fewer(&self, intervals: Intervals, values: &[Observation], each: &mut [Scale]) {
+        let sigma = LazyCell::new(|| {
+            let mut stated: Vec<f64> = values.iter().filter_map(|value| value.sigma).collect();
+            let stated = if stated.is_empty() {
+                0.0
+            } else {
+                median(&mut stated)
+            };
+            stated.max(displacement_sigma(values))
+        });
+        for scale in each {
+            for (change, apart) in [(&mut scale.near, 1), (&mut scale.far, 3)] {
+                let beyond = intervals.beyond_usual(&self.days, scale.days, apart);
+                if beyond > 0.0 {
+                    change.usual = change.usual.hypot(beyond.sqrt() * *sigma);
+                }
+            }
+        }
     }
 
     /// To be asked about ever earlier times, from `days` on.

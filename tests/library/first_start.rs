@@ -211,6 +211,45 @@ fn a_red_of_the_past_that_nothing_has_ended_is_called_after_a_first_start_as_of_
 }
 
 #[test]
+fn what_began_in_the_past_and_ended_while_it_was_gone_through_is_reported_with_its_end() {
+    let crisis = |hour: i64| 10.0 * (hour.clamp(30, 40) - 30) as f64;
+    let inputs = history(400, crisis);
+    let levels = |events: &[Event]| -> BTreeMap<String, Vec<AlertState>> {
+        let mut levels: BTreeMap<String, Vec<AlertState>> = BTreeMap::new();
+        for event in events {
+            if let EventKind::Alert { key, state, .. } = &event.kind {
+                levels.entry(key.clone()).or_default().push(*state);
+            }
+        }
+        levels
+    };
+    let mut late = monitor();
+    assert!(notice(&mut late, Notice::Past).is_empty());
+    let (first, rest) = inputs.split_at(2 * 100);
+    for (now, input) in first {
+        late.step(*now, input);
+    }
+    let mut said = Vec::new();
+    while late.owes_current() {
+        said.extend(notice(&mut late, Notice::Current));
+    }
+    for (now, input) in rest {
+        said.extend(late.step(*now, input));
+    }
+    while late.owes_past() {
+        said.extend(notice(&mut late, Notice::Retrace));
+    }
+    let (_, given) = as_it_came(&inputs);
+    let red = |levels: &BTreeMap<String, Vec<AlertState>>| {
+        let red = levels.iter().find(|(key, _)| key.contains("red"));
+        red.map(|(_, states)| states.clone())
+    };
+    let whole = [AlertState::Firing, AlertState::Resolved];
+    assert_eq!(red(&levels(&given)).unwrap(), whole);
+    assert_eq!(red(&levels(&said)).unwrap(), whole);
+}
+
+#[test]
 fn a_memory_saved_half_way_through_the_past_goes_on_from_there() {
     let inputs = history(60, |_| 0.0);
     let (mut one, mut other) = (monitor(), monitor());

@@ -127,3 +127,57 @@ fn chances_grow_with_the_span_and_never_pass_one() {
     let all = found.passage.chance_within(f64::INFINITY);
     assert!(all > 0.5 && all <= 1.0, "{all}");
 }
+
+/// The first readings of `before` followed by those of `after` from the day on on which it begins.
+fn then(before: &Observations, after: &Observations, day: f64) -> Observations {
+    let early = before.values.iter().filter(|one| one.t_days < day);
+    let late = after.values.iter().filter(|one| one.t_days >= day);
+    Observations {
+        values: early.chain(late).copied().collect(),
+        ..before.clone()
+    }
+}
+
+#[test]
+fn a_slope_read_daily_since_the_crisis_began_is_called_like_one_always_read_daily() {
+    for (rise, end) in [(40.0, 700.5), (80.0, 900.5)] {
+        let jitter = |t: f64| 0.8 * (t * 977.0).sin();
+        let fails = |t: f64| 0.1 * t - rise * (1.0 - t / end).ln() + jitter(t);
+        let daily = readings(700 + 200 * u32::from(end > 800.0), 1.0, fails);
+        let monthly = readings(24 + 7 * u32::from(end > 800.0), 30.0, fails);
+        let newest = Observations {
+            values: daily.values[daily.values.len() - 90..].to_vec(),
+            ..daily.clone()
+        };
+        let dense = collapse(&newest).sure.chance_within(3.0);
+        for days in [8.0, 14.0, 40.0] {
+            let changed = then(&monthly, &daily, end - days);
+            let indicators = Indicators::of(&changed).unwrap();
+            assert!((indicators.to_next_days() - 1.0).abs() < 1e-9);
+            let chance = collapse(&changed).sure.chance_within(3.0);
+            assert!(chance > 0.5 * dense, "{rise} {days}: {chance} {dense}");
+        }
+    }
+}
+
+#[test]
+fn steady_motion_read_more_seldom_from_now_on_is_not_called() {
+    for step in 0..20 {
+        // Errors that no two readings have alike.
+        let jitter = |t: f64| 1.4 * (t * (977.0 + f64::from(step))).sin();
+        let creep = |t: f64| 0.3 * t + jitter(t);
+        let (hourly, daily) = (
+            readings(24 * 20, 1.0 / 24.0, creep),
+            readings(60, 1.0, creep),
+        );
+        for day in 21..50 {
+            let mut changed = then(&hourly, &daily, 20.0);
+            changed
+                .values
+                .retain(|one| one.t_days < f64::from(day) + 0.5);
+            let chance = collapse(&changed).sure.chance_within(3.0);
+            // What calls red, unless the config has it otherwise.
+            assert!(chance < 0.27, "{step}, day {day}: {chance}");
+        }
+    }
+}

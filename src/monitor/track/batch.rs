@@ -66,7 +66,7 @@ impl Track {
             return false;
         }
         Indicators::of(&of_motion(observations)).is_some_and(|shown| {
-            let red = to_the_next_reading(policy.red_within(), shown.interval_days());
+            let red = to_the_next_reading(policy.red_within(), shown.to_next_days());
             !shown.may_reach(days_of(red), policy.red_chance)
                 && !shown.may_reach(days_of(policy.outlook), policy.orange_chance)
         })

@@ -58,7 +58,7 @@ impl Forecast {
     }
 
     fn to_the_next_reading(&self, span: SignedDuration) -> SignedDuration {
-        to_the_next_reading(span, self.plain.interval_days)
+        to_the_next_reading(span, self.plain.to_next_days)
     }
 
     /// Chance of a collapse within `days`, as the level takes it: what the law under the known load does not explain, it cannot

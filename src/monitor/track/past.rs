@@ -206,7 +206,9 @@ impl Track {
                 } else if event.kind.is_of_the_record() {
                     let is_new = Some(event.time) > walk.reported;
                     events.extend(is_new.then_some(event));
-                } else if is_of_a_level(&event) && event.time < walk.until {
+                } else if is_of_a_level(&event)
+                    && (event.time < walk.until || self.is_end_of_past(&walk.episode, &event))
+                {
                     walk.episode.push(event);
                 }
             }
@@ -220,6 +222,16 @@ impl Track {
         // Half as it was and half corrected it does not go on.
         walk.is_stale = self.pending.has_unjudged_late();
         (events, walk.is_stale || values.len() - from > MOST_READINGS)
+    }
+
+    /// Whether `event`, of a time from which on this benchmark is watched, ends what began in the past and is in force no more.
+    fn is_end_of_past(&self, episode: &[Event], event: &Event) -> bool {
+        let Some((key, AlertState::Resolved, level)) = alert(event) else {
+            return false;
+        };
+        let mut of_it = episode.iter().rev().filter_map(alert);
+        let newest = of_it.find(|(one, ..)| *one == key);
+        self.level() < level && newest.is_some_and(|(_, state, _)| state == AlertState::Firing)
     }
 
     /// The past has been judged: goes on as it leads to. A level from there that has not ended is called.
@@ -269,6 +281,18 @@ impl Track {
         // What a sensor at the end of its range gives is judged by the level.
         events.extend((self.quality).judge_sensor(&mut self.record, policy, level, now));
         events
+    }
+}
+
+/// The key, the state and the level of an alert.
+fn alert(event: &Event) -> Option<(&str, AlertState, Level)> {
+    if let EventKind::Alert {
+        key, state, level, ..
+    } = &event.kind
+    {
+        Some((key, *state, *level))
+    } else {
+        None
     }
 }
 

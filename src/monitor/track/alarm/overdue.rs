@@ -33,8 +33,8 @@ impl Overdue {
     fn of(policy: &Policy, time: Timestamp, forecast: &Forecast) -> Option<Self> {
         let outlook = forecast.in_force(days_of(policy.outlook));
         let chances = KeptForecast::of(time, &outlook.chances);
-        let interval = outlook.interval_days * SECONDS_PER_DAY;
-        let interval = SignedDuration::try_from_secs_f64(interval).ok()?;
+        let to_next = outlook.to_next_days * SECONDS_PER_DAY;
+        let interval = SignedDuration::try_from_secs_f64(to_next).ok()?;
         let is_red = |now: Timestamp| {
             chances.chance_within(now, days_of(policy.red_within())) >= policy.red_chance
         };

@@ -265,10 +265,9 @@ fn policy(evacuation: f64) -> Policy {
 
 /// How far ahead red looks from a reading where an evacuation takes so many days: days.
 fn ahead(evacuation: f64, indicators: &Indicators) -> f64 {
-    let interval = indicators.interval_days();
     in_days(to_the_next_reading(
         policy(evacuation).red_within(),
-        interval,
+        indicators.to_next_days(),
     ))
 }
 
