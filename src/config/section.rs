@@ -6,7 +6,7 @@ use super::{
     heartbeat, hook, link, record, source, value, vector,
 };
 use crate::alert::Policy;
-use crate::monitor::{Explain, Settings, SiteLevel, Watched};
+use crate::monitor::{Explain, Settings, SiteLevel, Watched, first_readings_within};
 use crate::reading::{BenchmarkId, Quantity, Suspicion, Unit};
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
@@ -22,6 +22,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     let base = file.parent().unwrap_or(Path::new(""));
     let mut site_section = root.table("site", "site");
     let site_level = site_level(&mut site_section);
+    let first = site_section.parsed("first_readings_within", value::duration_or_none);
     let (sources, brokers) = source::sources(root, base);
     let site = site(site_section, base, &sources);
     let policy = alert::policy(root.table("alert", "alert"), &Policy::default());
@@ -59,6 +60,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
             watched,
             declared,
             site: Some(site_level),
+            first_readings_within: first.map_or_else(first_readings_within, |given| given.value),
             accepted: own.accepted,
             holds_scale: true,
             covariates: (covariates.iter())

@@ -49,9 +49,9 @@ impl Awaited {
         })
     }
 
-    /// Those that are awaited.
-    pub(super) fn benchmarks(&self) -> impl Iterator<Item = &BenchmarkId> + Clone {
-        self.0.keys()
+    /// Those that are awaited, and since when.
+    pub(super) fn benchmarks(&self) -> impl Iterator<Item = (&BenchmarkId, Timestamp)> + Clone {
+        self.0.iter().map(|(id, since)| (id, *since))
     }
 }
 

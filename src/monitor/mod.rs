@@ -55,6 +55,7 @@ pub(crate) use saved::from_bytes;
 pub use saved::{MemoryPart, SavedError};
 pub use search::{SearchFinding, SearchJob};
 pub use silence::MAY_SKIP;
+pub(crate) use site::first_readings_within;
 pub use site::{SiteLevel, site_text};
 pub use undeclared::UndeclaredLoad;
 pub use watched::Watched;
@@ -145,6 +146,9 @@ pub struct Settings {
     /// How the benchmarks' levels make one of the whole site; `None`: there is none.
     #[serde(default)]
     pub site: Option<SiteLevel>,
+    /// For how long the site's level waits for benchmarks that have given no reading yet: fewer than `site` asks for do not make it meanwhile.
+    #[serde(default = "site::first_readings_within")]
+    pub first_readings_within: SignedDuration,
     /// Suspicions that people have looked into, and that do not hold.
     #[serde(default)]
     pub accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
@@ -166,6 +170,7 @@ impl Default for Settings {
             watched: Watched::default(),
             declared: Vec::new(),
             site: None,
+            first_readings_within: site::first_readings_within(),
             accepted: BTreeMap::new(),
             holds_scale: true,
             covariates: BTreeMap::new(),
@@ -408,7 +413,8 @@ impl Monitor {
 
     /// When the monitor wants a [`Input::Tick`] if nothing else comes before.
     pub fn next_deadline(&self) -> Option<Timestamp> {
-        self.benchmarks.next_deadline()
+        let of_benchmarks = self.benchmarks.next_deadline();
+        of_benchmarks.into_iter().chain(self.site.deadline()).min()
     }
 
     /// The level in force for a benchmark that has given readings.

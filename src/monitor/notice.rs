@@ -189,7 +189,7 @@ impl Monitor {
 
     /// Whether benchmarks of the config have given no reading, and nobody has been notified.
     pub fn misses_some(&self) -> bool {
-        let awaited: BTreeSet<&BenchmarkId> = self.outages.awaited().collect();
+        let awaited: BTreeSet<&BenchmarkId> = self.outages.awaited().map(|(id, _)| id).collect();
         self.never_read().iter().any(|id| !awaited.contains(id))
     }
 

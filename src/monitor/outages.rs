@@ -55,8 +55,8 @@ impl Outages {
         self.awaited.end(now, benchmark, why)
     }
 
-    /// The benchmarks that are unknown because they have given no reading.
-    pub(super) fn awaited(&self) -> impl Iterator<Item = &BenchmarkId> + Clone {
+    /// The benchmarks that are unknown because they have given no reading, and since when.
+    pub(super) fn awaited(&self) -> impl Iterator<Item = (&BenchmarkId, Timestamp)> + Clone {
         self.awaited.benchmarks()
     }
 

@@ -2,15 +2,22 @@
 
 use super::event::{AlertState, Event, EventKind, SITE};
 use super::in_force::LevelsInForce;
-use super::{Input, Monitor};
+use super::{Input, Monitor, Notice};
 use crate::alert::{Level, another_since};
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
+use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Benchmarks that a text names.
 const MOST_NAMED: usize = 5;
+
+/// For how long the site's level waits for benchmarks that have given no reading yet, where the config says nothing: one that is read once a day has
+/// given its first by then.
+pub(crate) const fn first_readings_within() -> SignedDuration {
+    SignedDuration::from_hours(25)
+}
 
 /// How the benchmarks' levels make one of the site. `unknown` does not count: it stands beside a level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,20 +56,57 @@ pub(super) struct SiteAlert {
     /// Since when each level was in force that was the newest of it: that is in its key.
     #[serde(default)]
     newest: BTreeMap<Level, Timestamp>,
+    /// When its level was first asked for once there was data time.
+    #[serde(default)]
+    begun: Option<Timestamp>,
+    /// Until when it has waited so far: by the clock that may be later than data time.
+    #[serde(default)]
+    has_waited_until: Option<Timestamp>,
+    /// When the first of the benchmarks that it waits for is waited for no longer.
+    #[serde(default)]
+    waits_until: Option<Timestamp>,
 }
 
 impl SiteAlert {
-    /// Takes the benchmarks' levels; says how the site's changes. Where fewer than the rule asks for are still judged, because of `all` nothing can be
-    /// said of `unknown`, all of those are enough: a site does not stay silent because its sensors have died, or have never read.
+    /// When its level is to be asked for again although no benchmark's has changed.
+    pub(super) fn deadline(&self) -> Option<Timestamp> {
+        self.waits_until
+    }
+
+    /// How many of those that have never read are waited for at `now`: unknown for less than `within`. They count as benchmarks without a level.
+    fn wait_for(
+        &mut self,
+        awaited: impl Iterator<Item = Timestamp>,
+        now: Timestamp,
+        within: SignedDuration,
+    ) -> usize {
+        let now = now.max(self.has_waited_until.unwrap_or(now));
+        self.has_waited_until = Some(now);
+        self.begun = self.begun.or((now > BEFORE_ALL).then_some(now));
+        let Some(begun) = self.begun else {
+            self.waits_until = None;
+            return awaited.count();
+        };
+        let ends = |since: Timestamp| {
+            let end = since.max(begun).checked_add(within);
+            end.unwrap_or(Timestamp::MAX)
+        };
+        let ends: Vec<Timestamp> = awaited.map(ends).filter(|end| *end > now).collect();
+        self.waits_until = ends.iter().min().copied();
+        ends.len()
+    }
+
+    /// Takes the benchmarks' levels; says how the site's changes. Where fewer than the rule asks for can be judged, because nothing can be
+    /// said of `lost` among `all`, all of those are enough: a site does not stay silent because its sensors have died, or never read.
     fn update(
         &mut self,
         rule: Option<SiteLevel>,
         now: Timestamp,
         in_force: &LevelsInForce,
-        (unknown, all): (usize, usize),
+        (lost, all): (usize, usize),
     ) -> Vec<Event> {
-        let judged = all.saturating_sub(unknown);
-        let needed = |rule: SiteLevel| match unknown {
+        let judged = all.saturating_sub(lost);
+        let needed = |rule: SiteLevel| match lost {
             0 => rule.needed(),
             _ => rule.needed().min(judged.max(1)),
         };
@@ -156,15 +200,30 @@ impl Monitor {
             Some(level)
         };
         let levels = || events.iter().filter_map(called);
-        if !is_changed && levels().next().is_none() {
+        // Where data time lies ahead of the clock, it has passed as far as the clock says.
+        let passed = if let Input::Notice(Notice::Passed { until, .. }) = input {
+            now.max(*until)
+        } else {
+            now
+        };
+        let is_waited = self.site.waits_until.is_none_or(|until| passed < until);
+        if !is_changed && is_waited && levels().next().is_none() {
             return Vec::new();
         }
         let (in_force, awaited) = (self.benchmarks.in_force(), self.outages.awaited());
+        let waited_for = if rule.is_some_and(|rule| rule.needed() > 1) {
+            let since = awaited.clone().map(|(_, since)| since);
+            let within = self.settings.first_readings_within;
+            self.site.wait_for(since, passed, within)
+        } else {
+            self.site.waits_until = None;
+            0
+        };
         let all = self.benchmarks.all().len() + awaited.clone().count();
         let unknown = in_force.unknown().iter();
-        let unknown: Vec<&BenchmarkId> = unknown.chain(awaited).collect();
-        let counts = (unknown.len(), all);
-        let mut of_site = self.site.update(rule, now, in_force, counts);
+        let unknown: Vec<&BenchmarkId> = unknown.chain(awaited.map(|(id, _)| id)).collect();
+        let lost = unknown.len() - waited_for;
+        let mut of_site = self.site.update(rule, now, in_force, (lost, all));
         let said = (self.site).update_unknown(rule, now, in_force, (&unknown, all));
         of_site.extend(said);
         of_site

@@ -103,7 +103,8 @@ impl Monitor {
         let gone: Vec<BenchmarkId> =
             (self.benchmarks.all().keys().filter(dropped).cloned()).collect();
         let mut events = Vec::new();
-        let awaited: Vec<BenchmarkId> = self.outages.awaited().cloned().collect();
+        let awaited = self.outages.awaited().map(|(id, _)| id.clone());
+        let awaited: Vec<BenchmarkId> = awaited.collect();
         for id in awaited {
             if !self.settings.watched.named.contains(&id) {
                 events.extend(self.outages.end_awaiting(now, &id, "is no longer watched"));

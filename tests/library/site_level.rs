@@ -6,12 +6,12 @@
     reason = "a helper that fails is a test that fails; a test looks for the kinds it names"
 )]
 
-use jiff::ToSpan;
+use jiff::{SignedDuration, ToSpan};
 use slipwatch::alert::{Level, Policy, Threshold};
 use slipwatch::monitor::{
     AlertState, Event, EventKind, Input, Monitor, Notice, Settings, SiteLevel, Watched,
 };
-use slipwatch::reading::{BenchmarkId, Reading, Timestamp, Unit};
+use slipwatch::reading::{BEFORE_ALL, BenchmarkId, Reading, Timestamp, Unit};
 use std::collections::BTreeSet;
 
 fn start() -> Timestamp {
@@ -140,27 +140,62 @@ fn where_fewer_can_be_judged_than_the_rule_asks_for_all_of_those_make_the_site()
 }
 
 #[test]
-fn benchmarks_that_have_never_read_cannot_be_judged_and_those_that_do_make_the_site() {
-    let named = ["a", "b", "c"].map(BenchmarkId::new);
-    let red_with = |reading: &[&str]| {
-        let mut monitor = Monitor::new(Settings {
-            watched: Watched {
-                named: named.clone().into(),
-                is_open: false,
-                ..Watched::default()
-            },
-            ..settings(Some(SiteLevel::AtLeast(2)))
-        });
-        for id in reading {
-            read(&mut monitor, id, 0, 0.0);
-        }
-        monitor.step(start(), &Input::Notice(Notice::Watching));
-        let said = of_the_site(&read(&mut monitor, "a", 1, 30.0));
-        said.iter()
-            .any(|(level, state, _)| (*level, *state) == (Level::Red, AlertState::Firing))
+fn benchmarks_that_have_never_read_are_waited_for_and_then_those_that_read_make_the_site() {
+    // b can be judged and is not red.
+    assert_eq!(first_day_of_three(&["a", "b"], 25), (false, None));
+    // Nothing can be said of b and c: at once of the site, and from the end of the wait on a makes its level.
+    assert_eq!(first_day_of_three(&["a"], 25), (true, Some(25)));
+    // Where there was no data time before, the first reading begins the wait.
+    assert_eq!(first_day_of_three(&[], 25), (true, Some(26)));
+    assert_eq!(first_day_of_three(&["a"], 0), (true, Some(1)));
+}
+
+/// Of a site of three, two of which make its level: whether it is unknown from the start on, and hours after that by the clock when it is red. Those that
+/// are `reading` have read before; `a` alone reads on, and is red from an hour after the start on.
+fn first_day_of_three(reading: &[&str], wait_hours: i64) -> (bool, Option<i64>) {
+    let mut monitor = Monitor::new(Settings {
+        watched: Watched {
+            named: ["a", "b", "c"].map(BenchmarkId::new).into(),
+            is_open: false,
+            ..Watched::default()
+        },
+        first_readings_within: SignedDuration::from_hours(wait_hours),
+        ..settings(Some(SiteLevel::AtLeast(2)))
+    });
+    for id in reading {
+        read(&mut monitor, id, 0, 0.0);
+    }
+    let before = if reading.is_empty() {
+        BEFORE_ALL
+    } else {
+        start()
     };
-    assert!(!red_with(&["a", "b"]), "b can be judged and is not red");
-    assert!(red_with(&["a"]), "nothing can be said of b and c");
+    let mut said = of_the_site(&monitor.step(before, &Input::Notice(Notice::Watching)));
+    let is_unknown = said.iter().any(|(level, ..)| *level == Level::Unknown);
+    let mut red_after = None;
+    for hour in 1..30 {
+        // Data time stays at the first readings of `a`; the clock goes on.
+        let reported = if hour <= 2 {
+            read(&mut monitor, "a", hour, 28.0 + hour as f64)
+        } else {
+            let until = start() + hour.hours();
+            let silences_alone = false;
+            let passed = Notice::Passed {
+                until,
+                silences_alone,
+            };
+            monitor.step(start() + 2.hours(), &Input::Notice(passed))
+        };
+        said.extend(of_the_site(&reported));
+        let last = said.iter().rfind(|(level, ..)| *level == Level::Red);
+        let is_red = last.is_some_and(|(_, state, _)| *state == AlertState::Firing);
+        red_after = red_after.or(is_red.then_some(hour));
+        assert_eq!(is_red, red_after.is_some(), "{said:?}");
+        if hour == 12 {
+            monitor = Monitor::restore(&monitor.save().unwrap()).unwrap();
+        }
+    }
+    (is_unknown, red_after)
 }
 
 #[test]
