@@ -421,6 +421,7 @@ impl Daemon {
     fn take_orders(&mut self) -> Result<(), StoreError> {
         self.since_orders = Stopwatch::start();
         if !self.site.is_waiting() {
+            self.store.delete_unreadable_orders()?;
             for order in self.store.orders()? {
                 self.site.order(order)?;
             }
@@ -457,6 +458,7 @@ impl Daemon {
             self.end_batch()?;
         }
         self.commit()?;
+        self.site.offer_refused()?;
         self.note_up_to_date()?;
         self.thin()?;
         self.verify();

@@ -41,18 +41,32 @@ const ANSWERS_WITHIN: Duration = Duration::from_secs(3);
 /// A line for each source of which there is no file now: its path may be mistyped; and for the first whose folder does not answer, as on a
 /// network's share whose server is away, behind which none is looked at.
 pub fn sources_without_files(config: &Config) -> Vec<String> {
+    without_files_among(&config.sources, &config.benchmarks)
+}
+
+/// The same of those sources that `former` has not, or looks elsewhere for.
+pub(super) fn new_sources_without_files(config: &Config, former: &Config) -> Vec<String> {
+    let is_new = |source: &&FileSource| {
+        let same = |one: &FileSource| (&one.id, &one.pattern) == (&source.id, &source.pattern);
+        !former.sources.iter().any(same)
+    };
+    let new: Vec<FileSource> = config.sources.iter().filter(is_new).cloned().collect();
+    without_files_among(&new, &config.benchmarks)
+}
+
+fn without_files_among(sources: &[FileSource], benchmarks: &[Benchmark]) -> Vec<String> {
     let (sender, listed) = mpsc::channel();
-    let (sources, benchmarks) = (config.sources.clone(), config.benchmarks.clone());
+    let (all, benchmarks) = (sources.to_vec(), benchmarks.to_vec());
     // It ends when the file system answers: nobody waits for it.
     std::thread::spawn(move || {
-        for source in &sources {
+        for source in &all {
             if sender.send(without_files(source, &benchmarks)).is_err() {
                 return;
             }
         }
     });
     let mut lines = Vec::new();
-    for source in &config.sources {
+    for source in sources {
         if let Ok(line) = listed.recv_timeout(ANSWERS_WITHIN) {
             lines.extend(line);
         } else {

@@ -232,28 +232,37 @@ impl Store {
         Ok(counts)
     }
 
-    /// What people have asked for and the daemon has not taken yet. What cannot be read of it is deleted.
+    /// The next few of what people have asked for and the daemon has not taken yet, but what cannot be read of it.
     ///
     /// # Errors
     /// [`StoreError`].
     pub fn orders(&self) -> Result<Vec<LeftOrder>, StoreError> {
-        let query = "SELECT id, body FROM command ORDER BY id LIMIT ?1";
-        let left = self.rows(query, [CHUNK], |row| {
-            Ok((row.get(0)?, row.get::<_, String>(1)?))
-        })?;
-        let mut orders = Vec::new();
-        for (number, body) in left {
-            match left_order(number, &body) {
-                Ok(order) => orders.push(order),
-                // Whoever gave it must not end the daemon by it, at each start anew.
-                Err(error) => {
-                    tracing::error!(%error, order = body, "an order that cannot be read is left out");
-                    let delete = "DELETE FROM command WHERE id = ?1";
-                    self.inner().connection.execute(delete, [number])?;
-                }
+        let left = self.commands()?.into_iter();
+        Ok(left
+            .filter_map(|(number, body)| left_order(number, &body).ok())
+            .collect())
+    }
+
+    /// Deletes what cannot be read of those orders, so that others come within the next few: whoever gave it must not end the daemon by it, at
+    /// each start anew.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn delete_unreadable_orders(&self) -> Result<(), StoreError> {
+        for (number, body) in self.commands()? {
+            if let Err(error) = left_order(number, &body) {
+                tracing::error!(%error, order = body, "an order that cannot be read is left out");
+                let delete = "DELETE FROM command WHERE id = ?1";
+                self.inner().connection.execute(delete, [number])?;
             }
         }
-        Ok(orders)
+        Ok(())
+    }
+
+    /// The number and the JSON of the next few orders.
+    fn commands(&self) -> Result<Vec<(i64, String)>, StoreError> {
+        let query = "SELECT id, body FROM command ORDER BY id LIMIT ?1";
+        self.rows(query, [CHUNK], |row| Ok((row.get(0)?, row.get(1)?)))
     }
 
     /// Leaves an order for the daemon, which takes it within a second, or at its next start, with how far the events have got, or had when

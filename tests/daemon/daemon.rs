@@ -412,6 +412,38 @@ async fn the_end_of_what_was_reported_is_reported_however_late_it_comes_and_afte
 }
 
 #[tokio::test]
+async fn an_end_that_found_no_room_at_a_hook_is_reported_once_there_is_some() {
+    let (folder, config) = site_folder();
+    let mut site = site(&config);
+    site.handle(&alert(noon(), Level::Red, AlertState::Firing));
+    site.commit(noon()).unwrap();
+    eventually("red", || !lines(&folder, "notified").is_empty()).await;
+    // More than may wait, before the hook's worker has its turn.
+    let many = 1100;
+    for number in 0..many {
+        let id = format!("p{number}");
+        let mut red = alert(noon(), Level::Red, AlertState::Firing);
+        red.benchmark = Some(BenchmarkId::new(&id));
+        if let EventKind::Alert { key, .. } = &mut red.kind {
+            *key = format!("{id}/red/1");
+        }
+        site.handle(&red);
+        site.commit(noon()).unwrap();
+    }
+    site.handle(&alert(noon(), Level::Red, AlertState::Resolved));
+    site.commit(noon()).unwrap();
+    eventually("the end", || {
+        site.offer_refused().unwrap();
+        let stdin = fs::read_to_string(folder.path().join("stdin"));
+        stdin.unwrap_or_default().contains("\"resolved\"")
+    })
+    .await;
+    close(site, noon()).await;
+    let notified = lines(&folder, "notified");
+    assert_eq!(notified.len(), many + 2, "each once");
+}
+
+#[tokio::test]
 async fn an_old_alert_in_force_is_reported_in_whatever_batch_it_comes_and_once() {
     let (folder, config) = site_folder();
     let wall = noon() + hours(24 * 3);

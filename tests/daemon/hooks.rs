@@ -8,6 +8,7 @@
 
 use crate::eventually::eventually;
 use crate::identity::red_fires;
+use crate::offered::offer;
 use slipwatch::alert::Level;
 use slipwatch::config::{ExtraMessages, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
@@ -218,7 +219,7 @@ async fn a_hook_that_fails_is_tried_again_with_the_same_key() {
         "echo $SLIPWATCH_ATTEMPT $SLIPWATCH_KEY >> calls\n[ $SLIPWATCH_ATTEMPT -ge 3 ] || exit 1",
     );
     let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
-    dispatcher.offer(&alert());
+    offer(&dispatcher, &alert());
     eventually("three calls", || {
         read(&folder, "calls").lines().count() == 3
     })
@@ -241,7 +242,7 @@ async fn a_hook_that_fails_is_shown_with_what_it_did_until_it_takes_an_alert() {
         ..quick_retry()
     };
     let dispatcher = Dispatcher::start(&[config], &retry, delivered);
-    dispatcher.offer(&alert_of(Level::Red, "5/red/1", "chance 0.3"));
+    offer(&dispatcher, &alert_of(Level::Red, "5/red/1", "chance 0.3"));
     eventually("the fault", || !faults.shown().is_empty()).await;
     let text = faults.shown().remove(0).text;
     assert!(
@@ -276,11 +277,11 @@ async fn an_escalation_reports_the_end_of_what_it_has_reported_and_nothing_of_wh
         let delivered = Delivered::of(Arc::clone(&store));
         let hooks = std::slice::from_ref(&config);
         let dispatcher = Dispatcher::start(hooks, &quick_retry(), delivered);
-        dispatcher.offer(&alert_of(Level::Red, key, ""));
+        offer(&dispatcher, &alert_of(Level::Red, key, ""));
         if !expected.is_empty() {
             eventually("the first call", || read(&folder, "calls").contains(key)).await;
         }
-        dispatcher.offer(&ended(key));
+        offer(&dispatcher, &ended(key));
         assert_eq!(dispatcher.close(LIMIT).await, Some(0));
         assert_eq!(read(&folder, "calls"), expected);
         let is_over = |state| {
@@ -305,9 +306,9 @@ async fn an_alert_that_waits_for_its_retry_holds_up_no_other() {
         ..Retry::default()
     };
     let dispatcher = Dispatcher::start(&[config], &slow, Delivered::default());
-    dispatcher.offer(&alert_of(Level::Red, "first", ""));
+    offer(&dispatcher, &alert_of(Level::Red, "first", ""));
     eventually("the first call", || read(&folder, "calls") == "first\n").await;
-    dispatcher.offer(&alert_of(Level::Orange, "second", ""));
+    offer(&dispatcher, &alert_of(Level::Orange, "second", ""));
     eventually("the second call", || {
         read(&folder, "calls") == "first\nsecond\n"
     })
@@ -344,10 +345,10 @@ async fn an_orange_a_red_and_an_unknown_are_tried_until_the_hook_takes_them() {
         let dispatcher =
             Dispatcher::start(std::slice::from_ref(&config), &tireless_retry(), delivered);
         let alert = alert_of(level, level.name(), "");
-        assert!(dispatcher.offer(&alert));
+        offer(&dispatcher, &alert);
         eventually("twelve calls", || calls(&folder, level.name()) >= 12).await;
         // What is in hand is not taken twice, what has been taken not again.
-        assert!(dispatcher.offer(&alert));
+        offer(&dispatcher, &alert);
         std::fs::write(folder.path().join("fixed"), "").unwrap();
         let identity = AlertIdentity {
             level: level.name(),
@@ -364,7 +365,7 @@ async fn an_orange_a_red_and_an_unknown_are_tried_until_the_hook_takes_them() {
     }
     // A yellow is given up.
     let dispatcher = Dispatcher::start(&[config], &tireless_retry(), Delivered::default());
-    dispatcher.offer(&alert_of(Level::Yellow, "yellow", ""));
+    offer(&dispatcher, &alert_of(Level::Yellow, "yellow", ""));
     eventually("two calls", || calls(&folder, "yellow") == 2).await;
     assert_eq!(dispatcher.close(LIMIT).await, Some(1));
     assert_eq!(calls(&folder, "yellow"), 2);
@@ -376,12 +377,12 @@ async fn what_is_superseded_or_resolved_is_not_tried_again() {
     config.levels = vec![Level::Orange, Level::Unknown];
     let dispatcher = Dispatcher::start(&[config], &tireless_retry(), Delivered::default());
     let orange = alert_of(Level::Orange, "orange", "");
-    dispatcher.offer(&orange);
+    offer(&dispatcher, &orange);
     eventually("some calls", || calls(&folder, "orange") >= 3).await;
     // The hook does not ask for red, but does not receive the orange any more either. Another level's
     // alert in hand shows that the worker goes on.
     dispatcher.supersede(&alert_of(Level::Red, "red", ""));
-    dispatcher.offer(&alert_of(Level::Unknown, "unknown", ""));
+    offer(&dispatcher, &alert_of(Level::Unknown, "unknown", ""));
     eventually("some calls", || calls(&folder, "unknown") >= 5).await;
     let before = calls(&folder, "orange");
     eventually("more calls", || calls(&folder, "unknown") >= 10).await;
@@ -390,7 +391,7 @@ async fn what_is_superseded_or_resolved_is_not_tried_again() {
     let mut end = alert_of(Level::Unknown, "unknown", "");
     end.state = AlertState::Resolved.into();
     std::fs::write(folder.path().join("hook.sh"), "exit 0").unwrap();
-    dispatcher.offer(&end);
+    offer(&dispatcher, &end);
     assert!(dispatcher.close(LIMIT).await.is_some());
 }
 
@@ -399,22 +400,27 @@ async fn an_alert_that_found_no_room_can_be_offered_again() {
     let (folder, config) =
         hook("echo $SLIPWATCH_KEY >> calls; until [ -e go ]; do sleep 0.01; done");
     let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
-    let keys: Vec<String> = (0..)
-        .map(|number| format!("k{number}"))
-        .take(5000)
-        .collect();
-    let full = |key: &&String| !dispatcher.offer(&alert_of(Level::Red, key, ""));
-    let refused = keys.iter().find(full).expect("never full").clone();
+    let keys: Vec<String> = (0..1200).map(|number| format!("k{number}")).collect();
+    let offer_all = || {
+        for key in &keys {
+            offer(&dispatcher, &alert_of(Level::Red, key, ""));
+        }
+    };
+    assert!(!dispatcher.finds_room(), "nothing was refused");
+    offer_all();
+    assert!(!dispatcher.finds_room(), "it is full");
     std::fs::write(
         folder.path().join("hook.sh"),
         "echo $SLIPWATCH_KEY >> calls",
     )
     .unwrap();
     std::fs::write(folder.path().join("go"), "").unwrap();
-    let again = alert_of(Level::Red, &refused, "");
-    eventually("room", || dispatcher.offer(&again)).await;
+    eventually("room", || dispatcher.finds_room()).await;
+    assert!(!dispatcher.finds_room(), "it is said once");
+    offer_all();
     assert!(dispatcher.close(LIMIT).await.is_some());
-    assert_eq!(calls(&folder, &refused), 1);
+    // A later alert of the benchmark supersedes those that still waited: the last one has found room.
+    assert_eq!(calls(&folder, "k1199"), 1);
 }
 
 #[tokio::test]
@@ -422,7 +428,10 @@ async fn only_the_levels_that_a_hook_asks_for_reach_it() {
     let (folder, config) = hook("echo $SLIPWATCH_LEVEL >> calls");
     let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
     for level in [Level::Yellow, Level::Orange, Level::Unknown, Level::Red] {
-        dispatcher.offer(&alert_at(level.name(), level, AlertState::Firing));
+        offer(
+            &dispatcher,
+            &alert_at(level.name(), level, AlertState::Firing),
+        );
     }
     assert_eq!(dispatcher.close(LIMIT).await, Some(0));
     let mut calls: Vec<String> = read(&folder, "calls").lines().map(str::to_owned).collect();
@@ -445,10 +454,16 @@ async fn a_red_is_reported_before_everything_that_waits_for_a_slow_hook() {
     let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
     for number in 0..40 {
         let name = format!("p{number}");
-        assert!(dispatcher.offer(&alert_at(&name, Level::Unknown, AlertState::Firing)));
+        offer(
+            &dispatcher,
+            &alert_at(&name, Level::Unknown, AlertState::Firing),
+        );
     }
     eventually("the first calls", || !read(&folder, "calls").is_empty()).await;
-    assert!(dispatcher.offer(&alert_at("toe", Level::Red, AlertState::Firing)));
+    offer(
+        &dispatcher,
+        &alert_at("toe", Level::Red, AlertState::Firing),
+    );
     eventually("the red", || read(&folder, "calls").contains("toe/red")).await;
     let before = read(&folder, "calls")
         .lines()
@@ -472,25 +487,25 @@ fn with_runs_that_hang(script: &str) -> (TempDir, Dispatcher) {
 async fn a_red_waits_for_no_run_of_a_lesser_alert_that_hangs() {
     let script = "echo \"$SLIPWATCH_BENCHMARK $SLIPWATCH_LEVEL\" >> calls; [ $SLIPWATCH_LEVEL = red ] || exec sleep 600";
     let (folder, dispatcher) = with_runs_that_hang(script);
-    let offer = |benchmark, level| {
-        assert!(dispatcher.offer(&alert_at(benchmark, level, AlertState::Firing)));
+    let offer_at = |benchmark, level| {
+        offer(&dispatcher, &alert_at(benchmark, level, AlertState::Firing));
     };
     let calls = || read(&folder, "calls");
     for benchmark in ["1", "2", "3"] {
-        offer(benchmark, Level::Unknown);
+        offer_at(benchmark, Level::Unknown);
     }
-    offer("4", Level::Orange);
+    offer_at("4", Level::Orange);
     eventually("four runs that hang", || calls().lines().count() == 4).await;
-    offer("5", Level::Red);
+    offer_at("5", Level::Red);
     eventually("the red of a fifth benchmark", || calls().contains("5 red")).await;
     // Its own orange is given some seconds to end, so that messages come in their order.
-    offer("4", Level::Red);
+    offer_at("4", Level::Red);
     eventually("the red of the fourth", || calls().contains("4 red")).await;
     // The end of a red comes before the orange that follows on it, also where no run for less is free.
     let mut end = alert_at("6", Level::Red, AlertState::Resolved);
     end.key = "6/red".to_owned();
-    assert!(dispatcher.offer(&end));
-    offer("6", Level::Orange);
+    offer(&dispatcher, &end);
+    offer_at("6", Level::Orange);
     eventually("the orange after a red", || calls().contains("6 orange")).await;
     let of_the_sixth = calls();
     let of_the_sixth = of_the_sixth.lines().filter(|line| line.starts_with('6'));
@@ -503,13 +518,13 @@ async fn a_red_waits_for_no_run_of_a_lesser_alert_that_hangs() {
 async fn a_red_waits_for_no_run_for_orange_or_for_the_end_of_unknown_that_hangs() {
     let script = "echo \"$SLIPWATCH_BENCHMARK $SLIPWATCH_LEVEL $SLIPWATCH_STATE\" >> calls; [ $SLIPWATCH_LEVEL = red ] || exec sleep 600";
     let (folder, dispatcher) = with_runs_that_hang(script);
-    let offer = |benchmark, level, state| {
-        assert!(dispatcher.offer(&alert_at(benchmark, level, state)));
+    let offer_at = |benchmark, level, state| {
+        offer(&dispatcher, &alert_at(benchmark, level, state));
     };
     let calls = || read(&folder, "calls");
-    offer("0", Level::Unknown, AlertState::Resolved);
+    offer_at("0", Level::Unknown, AlertState::Resolved);
     eventually("the end", || calls().lines().count() == 1).await;
-    offer("0", Level::Red, AlertState::Firing);
+    offer_at("0", Level::Red, AlertState::Firing);
     eventually("the red after the end", || calls().contains("0 red")).await;
     // The end that was broken off is tried again.
     eventually("the end", || {
@@ -517,10 +532,10 @@ async fn a_red_waits_for_no_run_for_orange_or_for_the_end_of_unknown_that_hangs(
     })
     .await;
     for benchmark in ["1", "2", "3", "4", "5"] {
-        offer(benchmark, Level::Orange, AlertState::Firing);
+        offer_at(benchmark, Level::Orange, AlertState::Firing);
     }
     eventually("six runs that hang", || calls().lines().count() == 8).await;
-    offer("6", Level::Red, AlertState::Firing);
+    offer_at("6", Level::Red, AlertState::Firing);
     eventually("the red of another one", || calls().contains("6 red")).await;
     assert!(dispatcher.close(Duration::ZERO).await.is_none());
 }
@@ -533,20 +548,28 @@ async fn what_is_superseded_while_it_waits_is_not_reported_and_a_silence_that_is
     let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
     // These keep the hook at work.
     for number in 0..4 {
-        dispatcher.offer(&alert_at(
-            &format!("p{number}"),
-            Level::Red,
-            AlertState::Firing,
-        ));
+        offer(
+            &dispatcher,
+            &alert_at(&format!("p{number}"), Level::Red, AlertState::Firing),
+        );
     }
     eventually("four at once", || {
         read(&folder, "calls").lines().count() == 4
     })
     .await;
-    dispatcher.offer(&alert_at("a", Level::Orange, AlertState::Firing));
-    dispatcher.offer(&alert_at("a", Level::Red, AlertState::Firing));
-    dispatcher.offer(&alert_at("b", Level::Unknown, AlertState::Firing));
-    dispatcher.offer(&alert_at("b", Level::Unknown, AlertState::Resolved));
+    offer(
+        &dispatcher,
+        &alert_at("a", Level::Orange, AlertState::Firing),
+    );
+    offer(&dispatcher, &alert_at("a", Level::Red, AlertState::Firing));
+    offer(
+        &dispatcher,
+        &alert_at("b", Level::Unknown, AlertState::Firing),
+    );
+    offer(
+        &dispatcher,
+        &alert_at("b", Level::Unknown, AlertState::Resolved),
+    );
     std::fs::write(folder.path().join("go"), "").unwrap();
     assert_eq!(dispatcher.close(LIMIT).await, Some(0));
     let calls = read(&folder, "calls");
@@ -557,7 +580,7 @@ async fn what_is_superseded_while_it_waits_is_not_reported_and_a_silence_that_is
 async fn deliver_once(config: &HookConfig, state: &Path) {
     let delivered = Delivered::of(Arc::new(Store::open(state).unwrap()));
     let dispatcher = Dispatcher::start(std::slice::from_ref(config), &quick_retry(), delivered);
-    dispatcher.offer(&alert());
+    offer(&dispatcher, &alert());
     assert_eq!(dispatcher.close(LIMIT).await, Some(0));
 }
 
@@ -579,7 +602,7 @@ async fn what_a_hook_has_taken_is_not_sent_again_after_a_restart() {
 async fn closing_does_not_wait_longer_than_its_limit_and_leaves_nothing_running() {
     let (folder, config) = hook("sleep 90 & echo $! > pid; wait");
     let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
-    dispatcher.offer(&alert());
+    offer(&dispatcher, &alert());
     eventually("the hook's start", || read(&folder, "pid").ends_with('\n')).await;
     assert_eq!(dispatcher.close(Duration::from_millis(100)).await, None);
     let pid = read(&folder, "pid").trim().to_owned();
@@ -631,10 +654,10 @@ async fn the_end_of_a_level_is_sent_before_the_level_that_follows_on_it_and_hold
         let hooks = std::slice::from_ref(&config);
         let dispatcher = Dispatcher::start(hooks, &retry, Delivered::default());
         let red = alert_of(Level::Red, "5/red/1", "");
-        assert!(dispatcher.offer(&red));
+        offer(&dispatcher, &red);
         eventually("the first run", || folder.path().join("begun").exists()).await;
-        assert!(dispatcher.offer(&ended(red)));
-        assert!(dispatcher.offer(&alert_of(Level::Orange, "5/orange/2", "")));
+        offer(&dispatcher, &ended(red));
+        offer(&dispatcher, &alert_of(Level::Orange, "5/orange/2", ""));
         eventually("all", || read(&folder, "calls").lines().count() == 3).await;
         assert_eq!(read(&folder, "calls").lines().collect::<Vec<_>>(), expected);
         assert_eq!(dispatcher.close(LIMIT).await, Some(0));

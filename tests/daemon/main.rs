@@ -13,6 +13,7 @@ mod hooks;
 mod identity;
 mod mqtt;
 mod mqtt_out;
+mod offered;
 mod page;
 mod retention;
 mod sample_hooks;

@@ -3,6 +3,7 @@
 use crate::eventually::eventually;
 use crate::identity::red_fires;
 use crate::mqtt::{Mosquitto, refusing_version_5};
+use crate::offered::offer;
 use crate::webhooks::{alert, quick, text};
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, Publish, QoS};
 use slipwatch::config::{self, HookConfig};
@@ -132,7 +133,7 @@ async fn an_alert_waits_for_a_broker_that_is_away_and_one_that_is_not_let_in_is_
     let dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::of(Arc::clone(&store)));
     let (alert, name) = (alert("5", "5/red/1"), hooks[0].name());
     let identity = red_fires("5/red/1");
-    assert!(dispatcher.offer(&alert));
+    offer(&dispatcher, &alert);
     eventually("attempts", || store.attempts(identity, &name).unwrap() >= 2).await;
     assert!(
         !store

@@ -2,6 +2,7 @@
 
 use crate::eventually::eventually;
 use crate::identity::red_fires;
+use crate::offered::offer;
 use crate::webhooks::{alert, quick, text};
 use slipwatch::config::{self, Destination, HookConfig, SharedDestination, way_out_tables};
 use slipwatch::runtime::deliver::{Dispatcher, Runner, Senders};
@@ -99,7 +100,7 @@ async fn a_way_out_that_is_one_row_gets_alerts_and_tries_again() {
     let store = Arc::new(Store::open(folder.path()).unwrap());
     let delivered = Delivered::of(Arc::clone(&store));
     let dispatcher = Dispatcher::with(&runner, &[siren(7)], &quick(), delivered);
-    assert!(dispatcher.offer(&red()));
+    offer(&dispatcher, &red());
     let is_delivered = || {
         let identity = red_fires("5/red/1");
         let fate = Some(DeliveryOutcome::Delivered);

@@ -3,6 +3,7 @@
 use crate::certificates::Certified;
 use crate::eventually::eventually;
 use crate::identity::red_fires;
+use crate::offered::offer;
 use crate::site::free_address;
 use slipwatch::alert::Level;
 use slipwatch::config::{self, HookConfig};
@@ -204,7 +205,7 @@ async fn a_webhook_that_fails_is_tried_again_under_the_same_id_until_it_is_taken
     let store = Arc::new(Store::open(&folder.path().join("state")).unwrap());
     let dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::of(Arc::clone(&store)));
     let red = alert("5", "toc/5/red/1");
-    assert!(dispatcher.offer(&red));
+    offer(&dispatcher, &red);
     let identity = red_fires("toc/5/red/1");
     let is_taken = || {
         let noted = store.is_noted(
@@ -215,7 +216,7 @@ async fn a_webhook_that_fails_is_tried_again_under_the_same_id_until_it_is_taken
         noted.unwrap()
     };
     eventually("taken", is_taken).await;
-    assert!(dispatcher.offer(&red), "it has been taken");
+    offer(&dispatcher, &red);
     assert_eq!(dispatcher.close(Duration::from_secs(20)).await, Some(0));
     let got = receiver.got();
     assert_eq!(got.len(), 5, "it is sent again after it was taken");
@@ -238,7 +239,10 @@ async fn a_receiver_that_never_answers_holds_no_other_ones_red() {
     let dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::default());
     for number in 0..20 {
         let benchmark = format!("b{number}");
-        assert!(dispatcher.offer(&alert(&benchmark, &format!("{benchmark}/red/1"))));
+        offer(
+            &dispatcher,
+            &alert(&benchmark, &format!("{benchmark}/red/1")),
+        );
     }
     eventually("that the hanging one is at work", || {
         !hanging.got().is_empty()
@@ -289,8 +293,8 @@ async fn a_webhook_is_sent_the_benchmarks_and_levels_that_it_asks_for() {
     ];
     let hooks = webhooks(folder.path(), &tables.concat());
     let dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::default());
-    dispatcher.offer(&alert("4", "4/red/1"));
-    dispatcher.offer(&alert("5", "5/red/1"));
+    offer(&dispatcher, &alert("4", "4/red/1"));
+    offer(&dispatcher, &alert("5", "5/red/1"));
     assert_eq!(dispatcher.close(Duration::from_secs(20)).await, Some(0));
     let keys = |receiver: &Receiver| -> BTreeSet<String> {
         let got = receiver.got();
@@ -455,7 +459,7 @@ async fn what_alertmanager_has_taken_is_sent_to_it_again_each_minute_for_as_long
     let hooks = webhooks(folder.path(), &table);
     let dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::default());
     let (taken, other) = (alert("5", KEY), alert("6", "6/red/2017-06-06T17:00:00Z"));
-    dispatcher.offer(&taken);
+    offer(&dispatcher, &taken);
     eventually("that it is taken", || receiver.got().len() == 1).await;
     for round in 2..4 {
         // Before a minute has gone nothing is.
@@ -478,7 +482,7 @@ async fn what_alertmanager_has_taken_is_sent_to_it_again_each_minute_for_as_long
     assert_eq!(bodies[2], bodies[0]);
     // A repetition that was under way may have come after the end.
     let end = ended(taken.clone(), "2017-06-09T05:00:00Z");
-    dispatcher.offer(&end);
+    offer(&dispatcher, &end);
     eventually("that the end is taken", || receiver.got().len() == 4).await;
     tokio::time::sleep(Duration::from_millis(200)).await;
     tokio::time::pause();
@@ -506,11 +510,11 @@ async fn the_end_of_a_red_that_alertmanager_did_not_take_comes_after_the_next_re
     };
     let dispatcher = Dispatcher::start(&hooks, &retry, Delivered::default());
     let count = |count: usize| move |receiver: &Receiver| receiver.got().len() >= count;
-    assert!(dispatcher.offer(&alert("5", KEY)));
+    offer(&dispatcher, &alert("5", KEY));
     eventually("the first", || count(1)(&receiver)).await;
-    assert!(dispatcher.offer(&ended(alert("5", KEY), "2017-06-09T05:00:00Z")));
+    offer(&dispatcher, &ended(alert("5", KEY), "2017-06-09T05:00:00Z"));
     eventually("its end, refused", || count(2)(&receiver)).await;
-    assert!(dispatcher.offer(&alert("5", "5/red/2017-06-09T06:00:00Z")));
+    offer(&dispatcher, &alert("5", "5/red/2017-06-09T06:00:00Z"));
     eventually("the next, and the end", || count(4)(&receiver)).await;
     assert_eq!(dispatcher.close(Duration::from_secs(20)).await, Some(0));
     let ends = receiver

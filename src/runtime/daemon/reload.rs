@@ -5,7 +5,7 @@ use crate::config::{self, Config, HookConfig, Token};
 use crate::monitor::Input;
 use crate::runtime::inherited::InheritedReadings;
 use crate::runtime::link;
-use crate::runtime::reloaded::{ConfigRefusal, sources_without_files};
+use crate::runtime::reloaded::{ConfigRefusal, new_sources_without_files};
 use crate::runtime::sandbox::{self, OURSELVES};
 use crate::runtime::service_faults::ServiceFaults;
 use crate::runtime::shutdown::Shutdown;
@@ -161,9 +161,8 @@ impl Daemon {
             tracing::warn!("{warning}");
         }
         let has_lost_hooks = fresh.hooks.is_empty() && !self.config.hooks.is_empty();
-        let were_fileless = sources_without_files(&self.config);
         (self.files_are_read, self.is_up_to_date) = (false, false);
-        self.config = fresh;
+        let former = std::mem::replace(&mut self.config, fresh);
         self.reporting.service.ready("watching");
         tracing::info!(file = %self.config.file.display(), "the config is taken");
         self.config_is_taken();
@@ -175,11 +174,7 @@ impl Daemon {
             tracing::error!("{text}");
             self.report("no-hooks", text)?;
         }
-        let fileless = sources_without_files(&self.config);
-        for line in fileless
-            .into_iter()
-            .filter(|line| !were_fileless.contains(line))
-        {
+        for line in new_sources_without_files(&self.config, &former) {
             tracing::warn!("{line}");
             self.report("no-file", line)?;
         }

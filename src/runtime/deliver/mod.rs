@@ -19,7 +19,7 @@ pub use super::way_out::Run;
 pub use runner::{Processes, Runner, Senders, run};
 
 use super::delivered::Delivered;
-use super::hook::{Alert, MessageState};
+use super::hook::{Alert, MessageState, state_name};
 use super::queued_alerts::QueuedAlerts;
 use crate::alert::Level;
 use crate::config::HookConfig;
@@ -29,6 +29,7 @@ use crate::store::DeliveryOutcome;
 use repeat::Repetition;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::sync::{mpsc, oneshot, watch};
@@ -37,6 +38,8 @@ use worker::Worker;
 
 /// Alerts that may wait for one hook.
 const QUEUE: usize = 1024;
+/// What found no room is offered again once so many have room.
+const ENOUGH_ROOM: usize = QUEUE / 2;
 
 /// How often and how fast a hook is tried again.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -82,6 +85,8 @@ struct HookQueue {
     hook: Arc<HookConfig>,
     queue: mpsc::Sender<Alert>,
     queued: Arc<Mutex<QueuedAlerts>>,
+    /// An alert has found the queue full.
+    lacks_room: AtomicBool,
     /// What the worker is to go by when the config says something else of the hook; `None` when it has no such hook any more.
     changes: watch::Sender<Option<Arc<HookConfig>>>,
     worker: AbortHandle,
@@ -98,17 +103,17 @@ impl HookQueue {
 
 /// What one hook is to receive.
 #[derive(Debug)]
-pub(super) struct HookShare {
+pub struct HookShare {
     /// Which hook it is, counted from 0.
-    pub(super) place: usize,
+    pub place: usize,
     /// Its name.
-    pub(super) name: String,
+    pub name: String,
     /// The benchmarks that it asks for; empty: all.
-    pub(super) audience: BTreeSet<BenchmarkId>,
+    pub audience: BTreeSet<BenchmarkId>,
     /// What it receives.
-    pub(super) alerts: Vec<Alert>,
+    pub alerts: Vec<Alert>,
     /// Ends that one of those reports, or whose beginning the hook did not receive.
-    pub(super) reported: Vec<Alert>,
+    pub reported: Vec<Alert>,
 }
 
 /// Without the ends that the end of a flood reports, and these.
@@ -188,38 +193,41 @@ impl Dispatcher {
             hook,
             queue,
             queued,
+            lacks_room: AtomicBool::new(false),
             changes,
             worker,
             ended,
         }
     }
 
-    /// Hands `alert` to every hook that asks for it, has not taken it before and does not
-    /// have it queued. Never waits: what finds a queue full is logged and not queued; `false` then.
-    pub fn offer(&self, alert: &Alert) -> bool {
-        self.offer_where(alert, false, &|_| true)
-    }
-
-    /// The same for those hooks that are `meant`; no attempt is made while `is_muted`, until [`Dispatcher::mute`] says
-    /// otherwise.
+    /// Hands `alert` to every hook that asks for it and is `meant`, has not taken it before and does not have it queued; no
+    /// attempt is made while `is_muted`, until [`Dispatcher::mute`] says otherwise. Never waits: what finds a queue full is logged and
+    /// not queued, until [`Dispatcher::finds_room`].
     pub(super) fn offer_where(
         &self,
         alert: &Alert,
         is_muted: bool,
         meant: &dyn Fn(&HookConfig) -> bool,
-    ) -> bool {
+    ) {
         self.supersede(alert);
-        let mut is_taken = true;
         for way in &self.hooks {
             if way.hook.asks_for(alert) && meant(&way.hook) {
-                is_taken &= self.offer_to(way, alert, is_muted);
+                self.offer_to(way, alert, is_muted);
             }
         }
-        is_taken
     }
 
-    /// Hands these alerts to the hook of a [`HookShare`].
-    pub(super) fn offer_share(&self, place: usize, alerts: &[Alert]) {
+    /// Whether a hook that had no room for an alert has some again: said once, and until then nothing offers that alert again.
+    pub fn finds_room(&self) -> bool {
+        let mut finds = false;
+        for way in &self.hooks {
+            finds |= way.queue.capacity() >= ENOUGH_ROOM && way.lacks_room.swap(false, Relaxed);
+        }
+        finds
+    }
+
+    /// Hands these alerts to the hook of a [`HookShare`]; a queue that is full as above.
+    pub fn offer_share(&self, place: usize, alerts: &[Alert]) {
         let Some(way) = self.hooks.get(place) else {
             return;
         };
@@ -353,7 +361,7 @@ impl Dispatcher {
         true
     }
 
-    fn offer_to(&self, way: &HookQueue, alert: &Alert, is_muted: bool) -> bool {
+    fn offer_to(&self, way: &HookQueue, alert: &Alert, is_muted: bool) {
         let (name, key) = (way.hook.name(), &alert.key);
         if way.hook.to.as_ref().is_some_and(|to| to.forgets()) {
             locked(&self.repetition).note(alert);
@@ -361,27 +369,27 @@ impl Dispatcher {
         // Queued first: a worker notes the receipt before it lets go.
         let mut queued = locked(&way.queued);
         if self.ends_unreported(way, &mut queued, alert) {
-            return true;
+            return;
         }
         if queued.cancels(alert) {
             tracing::debug!(hook = name, key, "over before it was reported");
             if let Err(error) = locked(&self.delivered).note(alert, &name, DeliveryOutcome::Over) {
                 tracing::warn!(hook = name, key, %error, "no receipt: a restart may send it");
             }
-            return true;
+            return;
         }
         if !queued.take(alert, is_muted) {
-            return true;
+            return;
         }
         if locked(&self.delivered).has(alert, &name) {
             queued.release(alert);
             tracing::debug!(hook = name, key, "delivered before");
         } else if let Err(error) = way.queue.try_send(alert.clone()) {
             queued.release(alert);
-            tracing::error!(hook = name, key, %error, "no room for an alert");
-            return false;
+            way.lacks_room.store(true, Relaxed);
+            let state = state_name(alert.state);
+            tracing::error!(hook = name, key, state, %error, "no room for an alert: it is offered again when there is");
         }
-        true
     }
 
     /// Lets the workers finish what waits, each alert once more at most, and stops them after

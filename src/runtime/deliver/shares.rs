@@ -6,7 +6,7 @@ use crate::runtime::hook::{Alert, MessageState};
 
 impl Dispatcher {
     /// What each hook is to receive of `alerts`.
-    pub(in crate::runtime) fn shares(&self, alerts: &[Alert]) -> Vec<HookShare> {
+    pub fn shares(&self, alerts: &[Alert]) -> Vec<HookShare> {
         let each = self.hooks.iter().enumerate();
         each.map(|(place, way)| {
             let (mut own, mut unreported) = (Vec::new(), Vec::new());

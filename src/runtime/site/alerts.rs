@@ -7,6 +7,7 @@ use crate::alert::{Level, Policy};
 use crate::config::HookConfig;
 use crate::monitor::Event;
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::deliver::Dispatcher;
 use crate::runtime::delivered::delivery;
 use crate::runtime::hook::Alert;
 use crate::store::StoreError;
@@ -194,6 +195,20 @@ impl Site {
             alerts.change_hooks(hooks, is_reread, limit);
         }
         self.wait_for_hooks()
+    }
+
+    /// Offers the hooks again what found no room, ends too, once there is some: as the state has it.
+    ///
+    /// # Errors
+    /// When the state cannot be read.
+    pub fn offer_refused(&mut self) -> Result<(), StoreError> {
+        let alerts = self.sinks.alerts.as_ref();
+        // What is not written yet cannot be read there.
+        if !self.is_full && alerts.is_some_and(Dispatcher::finds_room) {
+            tracing::info!("what a hook had no room for is offered again");
+            self.wait_for_hooks()?;
+        }
+        Ok(())
     }
 
     /// Whether so much waits for room on the disk that nothing more is to be taken in.
