@@ -138,6 +138,33 @@ fn row(day: u32, value: f64) -> String {
 }
 
 #[test]
+fn a_file_of_fixed_size_that_is_filled_from_its_front_is_read_as_it_is_filled() {
+    for size in [4096, 1 << 20] {
+        let mut bench = Bench::new("csv");
+        let path = bench.path("5.csv");
+        bench.write("5.csv", "");
+        let mut file = OpenOptions::new().write(true).open(&path).unwrap();
+        file.set_len(size).unwrap();
+        assert!(bench.news().is_empty());
+        write!(file, "{HEADER}{}", row(1, 1.5)).unwrap();
+        assert_eq!(bench.news(), ["5:1.5"]);
+        // A row that is not whole yet.
+        write!(file, "2017-06-02T00:00:00Z,2").unwrap();
+        assert!(bench.news().is_empty());
+        bench.restart();
+        writeln!(file, ".5").unwrap();
+        write!(file, "{}", row(3, 3.5)).unwrap();
+        assert_eq!(bench.news(), ["5:2.5", "5:3.5"]);
+        // What is appended behind the room is read, and what then comes behind that.
+        bench.append("5.csv", &format!("\n{}", row(4, 4.5)));
+        assert_eq!(bench.news(), ["5:4.5"]);
+        bench.append("5.csv", &row(5, 5.5));
+        assert_eq!(bench.news(), ["5:5.5"]);
+        assert!(bench.faults.is_empty(), "{:?}", bench.faults);
+    }
+}
+
+#[test]
 fn a_growing_file_is_read_line_by_line_and_a_partial_line_is_held() {
     let mut bench = Bench::new("csv");
     assert!(bench.news().is_empty());

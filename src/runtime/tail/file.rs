@@ -2,6 +2,7 @@
 
 use super::decode::{Arrival, Decoder};
 use super::position::{FileId, Saved};
+use super::preallocated::ReadSpan;
 use super::records::Channels;
 use super::text::{RefusedRows, TextReader, Unpacking};
 use crate::reading::Timestamp;
@@ -399,8 +400,9 @@ impl FileTail {
 
     fn read_text(&mut self, file: &File) -> io::Result<()> {
         let mut buffer = vec![0; READ_BYTES];
-        let count = file.read_at(&mut buffer, self.at)?;
-        self.at += count as u64;
+        let read = file.read_at(&mut buffer, self.at)?;
+        let ReadSpan { count, next } = ReadSpan::of(&buffer[..read], file, self.at)?;
+        self.at = next;
         if let Content::Text(text) = &mut self.content {
             let has_lines_ended_later = text.has_lines_ended_later();
             let fed = text.feed(&buffer[..count]);

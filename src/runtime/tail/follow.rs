@@ -13,6 +13,7 @@ use crate::runtime::clock::Stopwatch;
 use crate::store::Position;
 use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -141,6 +142,24 @@ impl Follower {
         files
             .into_iter()
             .any(|(index, _)| self.sources[*index].id == source)
+    }
+
+    /// Files that are read although they have no name any more, open, by the names of their positions.
+    pub(super) fn nameless(&self) -> BTreeMap<String, File> {
+        let nameless = self.files.iter().filter(|(_, file)| file.is_nameless());
+        let open = nameless.filter_map(|((source, path), file)| {
+            let held = file.held.as_ref()?.try_clone().ok()?;
+            Some((name(&self.sources[*source].id, path), held))
+        });
+        open.collect()
+    }
+
+    /// Goes on reading these of the files.
+    pub(super) fn hold(&mut self, nameless: &BTreeMap<String, File>) {
+        for ((source, path), file) in &mut self.files {
+            let held = nameless.get(&name(&self.sources[*source].id, path));
+            file.held = held.and_then(|held| held.try_clone().ok());
+        }
     }
 
     /// Lines, records and files that could not be used so far.

@@ -6,7 +6,8 @@ use super::watch::FolderWatch;
 use crate::config::{Benchmark, FileSource};
 use crate::runtime::clock::{self, Stopwatch};
 use crate::runtime::service_faults::{FaultPlace, ServiceFaultKind};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::task::{JoinError, JoinHandle, spawn_blocking};
@@ -62,6 +63,9 @@ pub struct FollowedFiles {
     /// How often each folder has been left out of late, and when it was last.
     counts: BTreeMap<PathBuf, (u32, Stopwatch)>,
     was_live: bool,
+    /// What readers that are made anew could not find again: files that have no name any more, and what has been reported of names that are no text.
+    nameless: BTreeMap<String, File>,
+    not_text: BTreeSet<PathBuf>,
 }
 
 impl FollowedFiles {
@@ -78,6 +82,8 @@ impl FollowedFiles {
             left_out: Vec::new(),
             counts: BTreeMap::new(),
             was_live: false,
+            nameless: BTreeMap::new(),
+            not_text: BTreeSet::new(),
         }
     }
 
@@ -106,6 +112,8 @@ impl FollowedFiles {
             .collect();
         let mut follower = Follower::new(&sources, &self.benchmarks, &saved);
         follower.is_live = self.was_live;
+        follower.hold(&self.nameless);
+        follower.not_text.clone_from(&self.not_text);
         let folders = sources.iter().enumerate();
         let folders = folders.map(|(index, one)| (one.pattern.folder().to_owned(), index));
         Readers {
@@ -141,6 +149,7 @@ impl FollowedFiles {
                         return Ok(Looked::Hangs);
                     };
                     self.note(&batch);
+                    self.keep(&readers.follower);
                     return Ok(Looked::Read(readers, batch));
                 }
                 () = tokio::time::sleep(LOOKED_AT) => {}
@@ -219,6 +228,13 @@ impl FollowedFiles {
         self.was_live |= batch.caught_up;
     }
 
+    fn keep(&mut self, follower: &Follower) {
+        self.nameless = follower.nameless();
+        if self.not_text.len() < follower.not_text.len() {
+            self.not_text.extend(follower.not_text.iter().cloned());
+        }
+    }
+
     /// The folders that do not answer.
     pub(super) fn faults(&self) -> impl Iterator<Item = (FaultPlace, String)> {
         self.left_out.iter().map(|one| {
@@ -231,5 +247,64 @@ impl FollowedFiles {
             let text = format!("{what}: it is not read until it does; the other sources are");
             (place, text)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config;
+    use crate::monitor::Input;
+    use std::fs::{self, OpenOptions};
+    use std::io::Write as _;
+    use std::os::unix::ffi::OsStringExt as _;
+
+    const HEADER: &str = "time,displacement_mm\n";
+
+    async fn look(
+        files: &mut FollowedFiles,
+        readers: Box<Readers>,
+    ) -> (Box<Readers>, ArrivalBatch) {
+        match files.look(readers).await.unwrap() {
+            Looked::Read(readers, batch) => (readers, batch),
+            Looked::Hangs => panic!("it answers"),
+        }
+    }
+
+    #[tokio::test]
+    async fn readers_that_are_made_anew_go_on_with_a_removed_file_and_report_no_name_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let site = "[site]\nname = \"s\"\nstate_dir = \"state\"\n\
+                    [[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"*.csv\"\n";
+        let config = config::parse(site, &folder.path().join("site.toml")).unwrap();
+        let name = std::ffi::OsString::from_vec(b"M\xfcller.csv".to_vec());
+        fs::write(folder.path().join(name), HEADER).unwrap();
+        let path = folder.path().join("5.csv");
+        let mut logger = OpenOptions::new()
+            .append(true)
+            .create(true)
+            .open(&path)
+            .unwrap();
+        write!(logger, "{HEADER}2020-01-01T00:00:00Z,1\n").unwrap();
+        let mut files = FollowedFiles::new(&config.sources, &config.benchmarks, Vec::new());
+        let readers = Box::new(files.readers());
+        let (readers, batch) = look(&mut files, readers).await;
+        assert_eq!(batch.quarantined.get("logger"), Some(&1));
+        let (readers, _) = look(&mut files, readers).await;
+        fs::remove_file(&path).unwrap();
+        let (readers, _) = look(&mut files, readers).await;
+        drop(readers);
+        writeln!(logger, "2020-01-01T01:00:00Z,2").unwrap();
+        let readers = Box::new(files.readers());
+        let (_, batch) = look(&mut files, readers).await;
+        let taken = batch.arrivals.iter().map(|one| &one.input);
+        let taken: Vec<_> = taken
+            .map(|input| match input {
+                Input::Reading { reading, .. } => reading.value,
+                other => panic!("{other:?}"),
+            })
+            .collect();
+        assert_eq!(taken, [2.0]);
+        assert!(batch.quarantined.is_empty(), "{:?}", batch.quarantined);
     }
 }

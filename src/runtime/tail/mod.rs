@@ -18,6 +18,7 @@ mod hanging;
 mod known;
 pub mod lines;
 mod position;
+mod preallocated;
 mod quarantine;
 mod recording;
 pub mod records;
