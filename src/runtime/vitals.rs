@@ -35,7 +35,7 @@ pub struct Health {
     pub is_store_writable: bool,
     /// Whether the rows of the state are what was written, as far as they have been looked at.
     pub is_store_damaged: bool,
-    /// Whether nothing is taken in because the disk is full.
+    /// Whether nothing more is taken in: what came waits for room on the disk, or for the host's clock.
     pub is_paused: bool,
     /// Values that the monitor took.
     pub readings: u64,
@@ -47,7 +47,7 @@ pub struct Health {
     pub without_clock: u64,
     /// Inputs that wait, unacknowledged, for room on the disk.
     pub unwritten: u64,
-    /// Whether the host's clock is earlier than readings that are known.
+    /// Whether the host's clock is earlier than readings that are known, or has leapt ahead.
     pub is_clock_wrong: bool,
     /// Values that wait, unacknowledged, until the host's clock is right.
     pub held: u64,

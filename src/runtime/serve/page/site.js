@@ -6,7 +6,8 @@ import { badge, badges, collapse, el, figure, isOutdated, left, list, local, out
 const RANK = { green: 0, unknown: 0.5, yellow: 1, orange: 2, red: 3 };
 const HEALTH = [
   [(h) => !h.is_caught_up, 'The daemon is still reading the past.'],
-  [(h) => h.is_paused || !h.is_store_writable, 'The state folder cannot be written to.'],
+  [(h) => !h.is_store_writable, 'The state folder cannot be written to.'],
+  [(h) => h.is_paused && h.is_store_writable, 'Nothing more is taken in: what came waits for room on the disk, or for the clock.'],
   [(h) => h.is_store_damaged, 'The state is damaged: restore a backup.'],
   [(h) => h.is_clock_wrong, 'The host\u2019s clock and the readings disagree: it is wrong, or the host was suspended.'],
   [(h) => h.config_refused, 'The config file was not taken at its reload: the one before stays in force. slipwatch check says why.'],
