@@ -6,7 +6,9 @@ use super::state::SiteArgs;
 use super::table::TextTable;
 use super::text;
 use crate::alert::{Level, chance_in_words};
-use crate::monitor::{CalledLevel, ChancesOfCollapse, Event, EventKind, SUSPECT, SUSPECT_ENDS};
+use crate::monitor::{
+    CalledLevel, ChancesOfCollapse, Event, EventKind, KindShown, SUSPECT, SUSPECT_ENDS,
+};
 use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp, figure};
 use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::clock;
@@ -229,7 +231,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
 /// The newest refit of each benchmark.
 fn newest_refits(store: &Store) -> anyhow::Result<BTreeMap<BenchmarkId, EventKind>> {
     let mut refits = BTreeMap::new();
-    for body in store.latest("refit")? {
+    for body in store.latest(KindShown::REFIT.name)? {
         let event: Event = serde_json::from_str(&body)?;
         if let Some(benchmark) = event.benchmark {
             refits.insert(benchmark, event.kind);
@@ -298,7 +300,7 @@ fn dated(event: &Event) -> Option<Timestamp> {
 /// The suspicions that have not ended, by benchmark.
 fn suspicions(store: &Store) -> anyhow::Result<BTreeMap<BenchmarkId, Vec<String>>> {
     let mut open: BTreeMap<(BenchmarkId, String), String> = BTreeMap::new();
-    for event in every(store, "fault")? {
+    for event in every(store, KindShown::FAULT.name)? {
         let (Some(benchmark), EventKind::Fault { kind, text }) = (event.benchmark, event.kind)
         else {
             continue;
@@ -428,11 +430,8 @@ fn not_used(status: &SiteStatus, zone: &TimeZone) -> String {
             "source {source}: {what} that could not be used: {count}; {shown}"
         );
     }
-    let serviced = status
-        .benchmarks
-        .iter()
-        .filter(|one| one.alarm_state == AlarmState::OutOfService);
-    for one in serviced {
+    let each = status.benchmarks.iter();
+    for one in each.filter(|one| one.alarm_state == AlarmState::OutOfService) {
         let _ = writeln!(
             lines,
             "{}: declared maintenance: its readings are kept and NOT JUDGED; the velocity and the chance are from before it",

@@ -32,13 +32,6 @@ enum About {
 /// A likelihood that is smaller by more than this, ln, is no figure.
 const MOST_NATS: f64 = 50.0;
 
-const REFIT: KindShown = KindShown {
-    name: "refit",
-    letter: None,
-    is_listed: false,
-    about: About::Slope,
-};
-
 const REGIME_FLIP: KindShown = KindShown {
     name: "regime-flip",
     letter: Some('R'),
@@ -81,25 +74,11 @@ const EFFECT_DROPPED: KindShown = KindShown {
     about: About::Slope,
 };
 
-const ALERT: KindShown = KindShown {
-    name: "alert",
-    letter: None,
-    is_listed: true,
-    about: About::Slope,
-};
-
 const TOGETHER: KindShown = KindShown {
     name: "together",
     letter: None,
     is_listed: true,
     about: About::Slope,
-};
-
-const FAULT: KindShown = KindShown {
-    name: "fault",
-    letter: Some('F'),
-    is_listed: true,
-    about: About::Data,
 };
 
 const DECLARED: KindShown = KindShown {
@@ -109,44 +88,73 @@ const DECLARED: KindShown = KindShown {
     about: About::Slope,
 };
 
-const CORRECTION: KindShown = KindShown {
-    name: "correction",
-    letter: Some('C'),
-    is_listed: true,
-    about: About::Data,
-};
+impl KindShown {
+    /// A refit after a reading.
+    pub const REFIT: Self = Self {
+        name: "refit",
+        letter: None,
+        is_listed: false,
+        about: About::Slope,
+    };
 
-const ORDER: KindShown = KindShown {
-    name: "order",
-    letter: Some('O'),
-    is_listed: true,
-    about: About::Slope,
-};
+    /// A level begins or ends.
+    pub const ALERT: Self = Self {
+        name: "alert",
+        letter: None,
+        is_listed: true,
+        about: About::Slope,
+    };
 
-const SUMMARY: KindShown = KindShown {
-    name: "summary",
-    letter: None,
-    is_listed: false,
-    about: About::Slope,
-};
+    /// The monitor cannot rely on what it is given.
+    pub const FAULT: Self = Self {
+        name: "fault",
+        letter: Some('F'),
+        is_listed: true,
+        about: About::Data,
+    };
+
+    /// Late or corrected readings would have called another level.
+    pub const CORRECTION: Self = Self {
+        name: "correction",
+        letter: Some('C'),
+        is_listed: true,
+        about: About::Data,
+    };
+
+    /// People asked for something.
+    pub const ORDER: Self = Self {
+        name: "order",
+        letter: Some('O'),
+        is_listed: true,
+        about: About::Slope,
+    };
+
+    /// The end of a replay.
+    pub const SUMMARY: Self = Self {
+        name: "summary",
+        letter: None,
+        is_listed: false,
+        about: About::Slope,
+    };
+}
 
 impl EventKind {
     /// Every kind, as it is shown.
     pub const SHOWN: [KindShown; 14] = [
-        REFIT,
+        KindShown::REFIT,
         REGIME_FLIP,
         INTERCEPT_DRIFT,
         TRANSITION_DRIFT,
         UNEXPLAINED_RESIDUAL,
         EFFECT_FOUND,
         EFFECT_DROPPED,
-        ALERT,
+        KindShown::ALERT,
         TOGETHER,
-        FAULT,
+        KindShown::FAULT,
         DECLARED,
-        CORRECTION,
-        ORDER,
-        SUMMARY,
+        KindShown::CORRECTION,
+        KindShown::ORDER,
+        KindShown::SUMMARY,
     ];
 
     /// Every word that [`EventKind::name`] may give.
@@ -163,20 +171,20 @@ impl EventKind {
     /// How it is shown.
     pub fn shown(&self) -> KindShown {
         match self {
-            Self::Refit { .. } => REFIT,
+            Self::Refit { .. } => KindShown::REFIT,
             Self::RegimeFlip { .. } => REGIME_FLIP,
             Self::InterceptDrift { .. } => INTERCEPT_DRIFT,
             Self::TransitionDrift { .. } => TRANSITION_DRIFT,
             Self::UnexplainedResidual(_) => UNEXPLAINED_RESIDUAL,
             Self::EffectFound { .. } => EFFECT_FOUND,
             Self::EffectDropped { .. } => EFFECT_DROPPED,
-            Self::Alert { .. } => ALERT,
+            Self::Alert { .. } => KindShown::ALERT,
             Self::Together { .. } => TOGETHER,
-            Self::Fault { .. } => FAULT,
+            Self::Fault { .. } => KindShown::FAULT,
             Self::Declared { .. } => DECLARED,
-            Self::Correction { .. } => CORRECTION,
-            Self::Order { .. } => ORDER,
-            Self::Summary(_) => SUMMARY,
+            Self::Correction { .. } => KindShown::CORRECTION,
+            Self::Order { .. } => KindShown::ORDER,
+            Self::Summary(_) => KindShown::SUMMARY,
         }
     }
 

@@ -4,7 +4,7 @@
 use super::standing::{NumberedEvent, TakenOrders, every};
 use crate::alert::Level;
 use crate::monitor::{
-    AlertState, CalledLevel, Declared, Event, EventKind, OrderKind, REMOVED, by_time,
+    AlertState, CalledLevel, Declared, Event, EventKind, KindShown, OrderKind, REMOVED, by_time,
 };
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Store, StoreError};
@@ -89,7 +89,7 @@ impl Alarms {
         declared: &[Declared],
     ) -> Result<Self, StoreError> {
         let is_known = |event: &Event| at.is_none_or(|at| event.time <= at);
-        let mut alerts = by_time(every(store, "alert")?);
+        let mut alerts = by_time(every(store, KindShown::ALERT.name)?);
         alerts.retain(is_known);
         let (mut newest, mut unknown) = (BTreeMap::new(), BTreeMap::new());
         for event in alerts {

@@ -1,7 +1,9 @@
 //! What stands at a moment, from the events in a site's state: alerts in force, orders, who has seen what.
 
 use crate::alert::Level;
-use crate::monitor::{AlertState, Event, EventKind, Order, OrderKind, by_time, site_text};
+use crate::monitor::{
+    AlertState, Event, EventKind, KindShown, Order, OrderKind, by_time, site_text,
+};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::TOLERANCE;
 use crate::store::{Store, StoreError};
@@ -18,7 +20,7 @@ pub type InForce = BTreeMap<(Option<BenchmarkId>, Level), Event>;
 /// [`StoreError`].
 pub fn in_force(store: &Store, until: Option<Timestamp>) -> Result<InForce, StoreError> {
     let mut standing = InForce::new();
-    for event in by_time(every(store, "alert")?) {
+    for event in by_time(every(store, KindShown::ALERT.name)?) {
         if until.is_none_or(|until| event.time <= until) {
             note(&mut standing, &event);
         }
@@ -54,7 +56,7 @@ fn name_those_in_force(standing: &mut InForce) {
 /// [`StoreError`].
 pub(super) fn first_call(store: &Store, key: &str) -> Result<Option<Event>, StoreError> {
     let mut standing = InForce::new();
-    for event in by_time(every(store, "alert")?) {
+    for event in by_time(every(store, KindShown::ALERT.name)?) {
         note(&mut standing, &event);
         if let EventKind::Alert {
             key: own,
@@ -197,12 +199,13 @@ impl TakenOrders {
     /// [`StoreError`].
     pub fn read(store: &Store, at: Option<Timestamp>) -> Result<Self, StoreError> {
         let is_known = |one: &NumberedEvent| at.is_none_or(|at| one.event.time <= at);
-        let mut taken = numbered(store, "order")?;
+        let mut taken = numbered(store, KindShown::ORDER.name)?;
         taken.retain(is_known);
         let mut called = BTreeMap::new();
         if !taken.is_empty() {
-            for NumberedEvent { number, event } in
-                numbered(store, "alert")?.into_iter().filter(is_known)
+            for NumberedEvent { number, event } in numbered(store, KindShown::ALERT.name)?
+                .into_iter()
+                .filter(is_known)
             {
                 if let EventKind::Alert {
                     state: AlertState::Firing,

@@ -6,7 +6,7 @@ use crate::alert::{Level, chance_in_words};
 use crate::cli::table::TextTable;
 use crate::cli::{explain, score, text};
 use crate::figures::{self, Replayed};
-use crate::monitor::{Event, EventKind, FailureTime, levels_in};
+use crate::monitor::{Event, EventKind, FailureTime, KindShown, levels_in};
 use crate::plot::escaped;
 use crate::reading::{Series, Timestamp, counted, days_since, figure};
 use crate::store::EARLIEST;
@@ -113,8 +113,8 @@ pub(super) fn in_order(material: &Material, series: &Series) -> Option<TextTable
     let ours = |event: &&Event| {
         let kind = event.kind.name();
         event.benchmark.as_ref() == Some(&series.benchmark)
-            && kind != "refit"
-            && kind != "summary"
+            && kind != KindShown::REFIT.name
+            && kind != KindShown::SUMMARY.name
             && event.time >= material.listed_from
     };
     let said: Vec<&Event> = material.events.iter().filter(ours).collect();

@@ -4,7 +4,7 @@ use super::DrillContext;
 use super::runner::DrillObserver;
 use crate::alert::Level;
 use crate::config::{self, Config, Drill, EXERCISE, HookConfig};
-use crate::monitor::{EventKind, Given, Order, OrderKind, Settings, Watched};
+use crate::monitor::{EventKind, Given, KindShown, Order, OrderKind, Settings, Watched};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::{self, Stopwatch};
 use crate::runtime::daemon::Daemon;
@@ -314,7 +314,7 @@ fn acknowledgement(
     store: &Store,
     started: Timestamp,
 ) -> Result<Option<Given>, crate::store::StoreError> {
-    let orders = every(store, "order")?;
+    let orders = every(store, KindShown::ORDER.name)?;
     Ok(orders.into_iter().rev().find_map(|event| {
         let is_of_it = event.benchmark.as_ref().map(BenchmarkId::as_str) == Some(EXERCISE);
         let EventKind::Order { order, given, .. } = event.kind else {

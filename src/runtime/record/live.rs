@@ -8,7 +8,7 @@ use super::files;
 use super::level_now::LevelsNow;
 use super::topics::TopicWriter;
 use crate::config::{Config, RecordFiles};
-use crate::monitor::{Event, Measured, by_time};
+use crate::monitor::{Event, KindShown, Measured, by_time};
 use crate::reading::Timestamp;
 use crate::runtime::clock::{self, Stopwatch};
 use crate::runtime::recorded::RecordStanding;
@@ -238,7 +238,7 @@ impl Recorder {
     /// Opens the state, and learns which levels are in force where the record goes on.
     fn look(&mut self) -> Result<Store, RecordError> {
         let store = Store::look(&self.state_dir)?;
-        let alerts = every_until(&store, "alert", self.standing.event)?;
+        let alerts = every_until(&store, KindShown::ALERT.name, self.standing.event)?;
         for alert in by_time(alerts) {
             self.levels.take(&alert);
         }

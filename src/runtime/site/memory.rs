@@ -8,8 +8,8 @@ use super::{
 };
 use crate::alert::Level;
 use crate::monitor::{
-    AlertState, EventKind, Input, MemoryPart, Monitor, Notice, SavedError, SearchJob, Settings,
-    from_bytes,
+    AlertState, EventKind, Input, KindShown, MemoryPart, Monitor, Notice, SavedError, SearchJob,
+    Settings, from_bytes,
 };
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::delivered::delivery;
@@ -416,18 +416,20 @@ impl EndedKeys {
         let keys = match &mut self.0 {
             Some(keys) => keys,
             keys => {
-                let ended = every(store, "alert")?.into_iter().filter_map(|event| {
-                    if let EventKind::Alert {
-                        key,
-                        state: AlertState::Resolved,
-                        ..
-                    } = event.kind
-                    {
-                        Some(key)
-                    } else {
-                        None
-                    }
-                });
+                let ended = every(store, KindShown::ALERT.name)?
+                    .into_iter()
+                    .filter_map(|event| {
+                        if let EventKind::Alert {
+                            key,
+                            state: AlertState::Resolved,
+                            ..
+                        } = event.kind
+                        {
+                            Some(key)
+                        } else {
+                            None
+                        }
+                    });
                 keys.insert(ended.collect())
             }
         };

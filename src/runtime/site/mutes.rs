@@ -3,7 +3,7 @@
 use super::Site;
 use super::standing::Attention;
 use crate::alert::Level;
-use crate::monitor::{AlertState, EventKind, Order};
+use crate::monitor::{AlertState, EventKind, KindShown, Order};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::Stopwatch;
 use crate::runtime::hook::Alert;
@@ -217,7 +217,7 @@ impl Site {
         place: Option<&BenchmarkId>,
     ) -> Result<Vec<String>, StoreError> {
         let mut called = match &self.sinks.store {
-            Some(store) => every_since(store, "alert", last)?,
+            Some(store) => every_since(store, KindShown::ALERT.name, last)?,
             None => Vec::new(),
         };
         called.extend(self.fresh.iter().map(|alert| alert.event.clone()));

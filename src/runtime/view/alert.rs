@@ -2,7 +2,7 @@
 
 use super::{SiteReader, read};
 use crate::alert::{Level, Policy};
-use crate::monitor::{AlertState, Event, EventKind, Settings};
+use crate::monitor::{AlertState, Event, EventKind, KindShown, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::clock;
@@ -123,7 +123,7 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
         return Ok(None);
     };
     let (since, benchmark) = (call.event.time, call.event.benchmark.clone());
-    let alerts = numbered(store, "alert")?;
+    let alerts = numbered(store, KindShown::ALERT.name)?;
     let end = end(&alerts, &call);
     let (state, ended) = (end.state, end.time);
     let settings = store.settings_at(call.step)?.unwrap_or_default();
@@ -165,7 +165,7 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
 /// The event that called the alert: that of the key, or the newest whose key goes on with a slash.
 fn call(store: &Store, asked: &str) -> Result<Option<StoredCall>, StoreError> {
     let mut found: Option<StoredCall> = None;
-    for placed in store.placed_events("alert")? {
+    for placed in store.placed_events(KindShown::ALERT.name)? {
         let event: Event = read(&placed.body)?;
         let EventKind::Alert { key, state, .. } = &event.kind else {
             continue;
@@ -205,7 +205,7 @@ fn from_its_first(store: &Store, call: StoredCall) -> Result<StoredCall, StoreEr
     let Some(first) = first_call(store, key)?.filter(|first| first.time < call.event.time) else {
         return Ok(call);
     };
-    for placed in store.placed_events("alert")? {
+    for placed in store.placed_events(KindShown::ALERT.name)? {
         let event: Event = read(&placed.body)?;
         if is_same_call(&event, &first) {
             return Ok(StoredCall {
@@ -304,7 +304,7 @@ fn audit(
             audit.push(event.clone());
         }
     }
-    for event in every(store, "correction")? {
+    for event in every(store, KindShown::CORRECTION.name)? {
         if event.benchmark == call.event.benchmark && event.time >= call.event.time {
             audit.push(event);
         }
@@ -370,7 +370,7 @@ fn refit(
     let Some(benchmark) = benchmark else {
         return Ok(None);
     };
-    let body = store.event_at(benchmark.as_str(), "refit", until)?;
+    let body = store.event_at(benchmark.as_str(), KindShown::REFIT.name, until)?;
     body.as_deref().map(read).transpose()
 }
 

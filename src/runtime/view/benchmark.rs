@@ -191,9 +191,10 @@ impl SiteReader {
         let all = self.series(name, known)?;
         let is_cut = all.readings.len() >= MOST_SHOWN;
         let shown = within(&all, shown_span);
-        let latest = self.store.event_at(name, "refit", known)?;
+        let latest = self.store.event_at(name, KindShown::REFIT.name, known)?;
         let latest: Option<Event> = latest.as_deref().map(read).transpose()?;
-        let mut alerts = self.events(name, "alert", TimeSpan::new(EARLIEST, known))?;
+        let mut alerts =
+            self.events(name, KindShown::ALERT.name, TimeSpan::new(EARLIEST, known))?;
         let course = all
             .readings
             .first()
@@ -286,11 +287,15 @@ impl SiteReader {
         buckets: usize,
     ) -> Result<Vec<ForecastView>, StoreError> {
         let (mut all, mut failure) = (Vec::new(), None);
-        self.store
-            .events_within(name, "refit", span, &mut |body| match read(body) {
+        self.store.events_within(
+            name,
+            KindShown::REFIT.name,
+            span,
+            &mut |body| match read(body) {
                 Ok(event) => all.extend(forecast(&event)),
                 Err(error) => failure = Some(error),
-            })?;
+            },
+        )?;
         failure.map_or_else(|| Ok(thinned(all, buckets)), Err)
     }
 

@@ -2,7 +2,7 @@
 
 use super::{SiteReader, held, read};
 use crate::alert::Level;
-use crate::monitor::{CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime};
+use crate::monitor::{CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime, KindShown};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::regime::Regime;
 use crate::runtime::alarm_state::{AlarmState, Alarms};
@@ -226,9 +226,9 @@ impl SiteReader {
             alarm_state: AlarmState::Normal,
             benchmark,
         };
-        let refit = self
-            .store
-            .event_at(standing.benchmark.as_str(), "refit", until)?;
+        let refit =
+            self.store
+                .event_at(standing.benchmark.as_str(), KindShown::REFIT.name, until)?;
         if let Some(body) = refit {
             standing.forecast(&read(&body)?);
         }
