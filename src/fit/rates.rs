@@ -136,6 +136,11 @@ impl Observations {
         }
     }
 
+    /// The rates in all readings, oldest first; at most as many as [`RateOptions`] has by itself.
+    pub fn all_rates(&self) -> Vec<Rate> {
+        self.rates(0..self.values.len(), RateOptions::default())
+    }
+
     /// The rates in the readings of `range`, oldest first.
     pub fn rates(&self, range: Range<usize>, options: RateOptions) -> Vec<Rate> {
         let Some(values) = self.values.get(range) else {
@@ -499,8 +504,8 @@ mod tests {
     }
 
     #[test]
-    fn readings_too_close_to_be_told_apart_are_averaged_and_noise_that_lasts_is_not_averaged_away()
-    {
+    fn readings_too_close_to_be_distinguished_are_averaged_and_noise_that_lasts_is_not_averaged_away()
+     {
         // A tenth of a mm up or down each minute, and the same for an hour each.
         let minutes = 1440_u32;
         let at = |noise: &dyn Fn(u32) -> f64| {

@@ -22,8 +22,8 @@ pub use sweep::{SweepOptions, SweepReport, SweepRow, sweep, sweep_showing};
 pub use together::{ApartReport, GroupReport, TogetherReport, together};
 
 use crate::fit::{
-    Assumptions, ConstantLoad, Exponent, LawDraws, Observations, PointReadings, Rate, RateOptions,
-    Solution, widen_merged,
+    Assumptions, ConstantLoad, Exponent, LawDraws, Observations, PointReadings, Rate, Solution,
+    widen_merged,
 };
 use crate::forecast::{FARTHEST_INTERCEPT, HORIZON_DAYS, InverseVelocityLine, outlook};
 use crate::model::{Accuracy, Law, Trajectory};
@@ -197,8 +197,7 @@ impl Inversion {
     }
 
     fn rates(&self) -> Vec<Rate> {
-        let all = 0..self.observations.values.len();
-        self.observations.rates(all, RateOptions::default())
+        self.observations.all_rates()
     }
 
     fn inverse_velocity(&self, rates: &[Rate], accelerating: Option<f64>) -> FittedInverseVelocity {

@@ -2,7 +2,7 @@
 
 use super::report::FittedFailureTime;
 use super::{Inversion, InversionOptions};
-use crate::fit::{Rate, RateOptions};
+use crate::fit::Rate;
 use crate::forecast::{
     Dependence, FEWEST_READINGS, FailureTimeLikelihood, Passage, Snapshot, by_the_law, groups,
     measurably_moves,
@@ -137,7 +137,7 @@ fn predicted(inversion: &Inversion, time: Timestamp) -> Option<(Passage, f64)> {
     let critical = inversion.options.critical_velocity_mm_per_day;
     let passage = by_the_law(&observations, critical)?;
     let now_days = observations.values.last()?.t_days;
-    let rates = observations.rates(0..observations.values.len(), RateOptions::default());
+    let rates = observations.all_rates();
     measurably_moves(&rates).then_some((passage, days - now_days))
 }
 

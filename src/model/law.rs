@@ -39,15 +39,6 @@ pub struct PaperParameters {
     pub s_theta_i: Option<f64>,
 }
 
-/// How the state variable of a solution is to be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StateSense {
-    /// The paper's x.
-    X,
-    /// theta / `theta_i`, at m = 1 where there is no x.
-    RelativeAge,
-}
-
 /// Parameters that make no law.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{name} is {value}: expected {expected}")]
@@ -189,25 +180,14 @@ impl Law {
         }
     }
 
-    /// How the state of this law is to be read.
-    pub fn state_sense(&self) -> StateSense {
-        if self.p == 0.0 {
-            StateSense::RelativeAge
-        } else {
-            StateSense::X
-        }
-    }
-
     /// The state at inverse velocity y: the paper's x, or `theta/theta_i` at m = 1.
     pub fn state(&self, y: f64) -> Option<f64> {
-        match self.state_sense() {
-            StateSense::RelativeAge => Some(y),
-            // y = (x/x_i)^m
-            StateSense::X => self
-                .paper()
-                .x_i
-                .map(|x_i| x_i * (y.ln() * (1.0 - self.p)).exp()),
+        if self.p == 0.0 {
+            return Some(y);
         }
+        // y = (x/x_i)^m
+        let x_i = self.paper().x_i;
+        x_i.map(|x_i| x_i * (y.ln() * (1.0 - self.p)).exp())
     }
 }
 

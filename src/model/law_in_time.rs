@@ -21,7 +21,7 @@ impl Law {
     }
 
     /// ln of the y at which the velocity inflects: y*^p = 2b / ((2-p) a).
-    pub fn ln_y_transition(&self) -> Option<f64> {
+    fn ln_y_transition(&self) -> Option<f64> {
         if self.kappa == 0.0 || self.p >= 2.0 {
             return None;
         }

@@ -31,7 +31,7 @@ mod trajectory;
 
 pub use accuracy::Accuracy;
 pub use driven::{Drive, Driven, LoadEvent};
-pub use law::{Law, LawError, PaperParameters, StateSense};
+pub use law::{Law, LawError, PaperParameters};
 pub use load::Load;
 pub use loaded::LoadedLaw;
 pub use trajectory::{Motion, Trajectory};

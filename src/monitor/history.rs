@@ -401,8 +401,7 @@ impl History {
 
     /// The velocities that the readings show.
     pub(super) fn rates(&self) -> Vec<Rate> {
-        let all = 0..self.observations.values.len();
-        self.observations.rates(all, RateOptions::default())
+        self.observations.all_rates()
     }
 
     /// How many of the newest readings have one and the same value.

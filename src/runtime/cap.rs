@@ -7,6 +7,7 @@
 
 use super::clock;
 use super::hook::{Alert, HookOutcome, MessageState, state_name};
+use super::kept;
 use super::way_out::{DeliveryAttempt, WayOut, destination};
 use crate::alert::{Level, is_observed};
 use crate::config::CapFolder;
@@ -16,8 +17,8 @@ use nix::unistd::{AccessFlags, access};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
-use std::fs::{self, File};
-use std::io::{self, Write as _};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Messages that a chain names; the oldest go.
@@ -210,7 +211,7 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
         });
         let excess = chain.len().saturating_sub(LONGEST_CHAIN);
         chain.drain(..excess);
-        replace(&place, &serde_json::to_vec(&chain)?)?;
+        kept::replace(&place, &serde_json::to_vec(&chain)?)?;
         chain.len() - 1
     };
     let (message, before) = (&chain[at], &chain[..at]);
@@ -219,7 +220,7 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
         message.sent.strftime("%Y%m%dT%H%M%SZ"),
         message.identifier
     );
-    replace(
+    kept::replace(
         &cap.folder.join(name),
         xml(cap, alert, message, before).as_bytes(),
     )
@@ -259,17 +260,6 @@ fn read(file: &Path) -> io::Result<Vec<CapMessage>> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
         Err(error) => Err(error),
     }
-}
-
-/// Nobody sees half of it, and it is on the disk when this returns.
-fn replace(file: &Path, bytes: &[u8]) -> io::Result<()> {
-    let partial = file.with_extension("partial");
-    let mut out = File::create(&partial)?;
-    out.write_all(bytes)?;
-    out.sync_all()?;
-    fs::rename(&partial, file)?;
-    file.parent()
-        .map_or(Ok(()), |folder| File::open(folder)?.sync_all())
 }
 
 fn xml(cap: &CapFolder, alert: &Alert, message: &CapMessage, before: &[CapMessage]) -> String {

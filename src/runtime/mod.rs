@@ -21,6 +21,7 @@ pub mod ingest;
 pub mod inherited;
 mod kept;
 mod link;
+mod locked;
 pub mod log;
 pub mod many;
 pub mod mqtt;

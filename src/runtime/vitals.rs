@@ -2,6 +2,7 @@
 
 use super::clock::Stopwatch;
 use super::drilled::DrillRecord;
+use super::locked::locked;
 use super::mute::Mute;
 use super::recorded::RecordStanding;
 use super::service_faults::{ServiceFault, ServiceFaults};
@@ -13,8 +14,8 @@ use prometheus_client::metrics::histogram::Histogram;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Benchmarks of which single figures are given; of the others only how many stand at each level.
@@ -226,7 +227,7 @@ impl Vitals {
     }
 
     /// All that was taken is durable.
-    pub fn has_taken(&self) {
+    pub fn note_taken(&self) {
         *locked(&self.oldest) = None;
     }
 
@@ -341,10 +342,6 @@ fn note_all(points: &mut BTreeMap<BenchmarkId, VitalsPoint>, events: &[Event]) {
                 .note(&event.kind);
         }
     }
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

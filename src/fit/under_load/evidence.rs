@@ -214,7 +214,7 @@ fn cannot_reach(least: f64, best: &[f64], ln: &[f64], most_outside: f64) -> bool
     lanes.all(|(best, ln)| *best < least && ln + most_outside < least)
 }
 
-pub(super) const NO_EVIDENCE: ShapeEvidence = ShapeEvidence {
+const NO_EVIDENCE: ShapeEvidence = ShapeEvidence {
     ln: f64::NEG_INFINITY,
     ln_velocity: 0.0,
     load: 0.0,

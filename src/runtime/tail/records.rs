@@ -17,7 +17,7 @@ pub const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 /// Opcode and length, before every record.
 pub const HEADER_BYTES: usize = 9;
 /// Longest record that is read into memory, and longest content of a chunk, bytes.
-pub const LONGEST_RECORD: u64 = 64 * 1024 * 1024;
+const LONGEST_RECORD: u64 = 64 * 1024 * 1024;
 
 /// No file is longer: a record that says it is, an attachment too, hides all that comes after it.
 const FARTHEST: u64 = 1 << 44;

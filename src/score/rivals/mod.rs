@@ -14,7 +14,7 @@ pub(super) mod tangent;
 pub(super) mod voight;
 
 use super::Known;
-use crate::fit::{Rate, RateOptions};
+use crate::fit::Rate;
 use crate::forecast::{LawForecaster, Passage, by_the_law};
 use crate::reading::Quantity;
 
@@ -45,7 +45,7 @@ fn point(days: f64) -> Option<Passage> {
 /// The velocities in the record, oldest first.
 fn rates(known: &Known) -> Vec<Rate> {
     let observations = &known.observations;
-    let mut rates = observations.rates(0..observations.values.len(), RateOptions::default());
+    let mut rates = observations.all_rates();
     let is_velocity = observations.quantity == Quantity::Velocity;
     if is_velocity && observations.values.iter().all(|one| one.sigma.is_none()) {
         // The methods as published take velocities as they are read.
