@@ -151,7 +151,7 @@ async fn without_the_monitor(broker: &Mosquitto, messages: &[String]) -> f64 {
     };
     let (deliveries, stop, task) = start();
     tokio::time::sleep(Duration::from_secs(2)).await;
-    stop.pull();
+    stop.request();
     task.await.unwrap();
     drop(deliveries);
     broker.publish(messages.to_vec()).await;
@@ -179,7 +179,7 @@ async fn without_the_monitor(broker: &Mosquitto, messages: &[String]) -> f64 {
         });
     }
     let seconds = began.elapsed().as_secs_f64();
-    stop.pull();
+    stop.request();
     task.await.unwrap();
     seconds
 }

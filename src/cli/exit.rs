@@ -72,8 +72,8 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
         return Some(match error {
             RunError::State { .. } => IO,
             RunError::Follow(_) => TROUBLE,
-            RunError::Pulse(ReportingError::Token(_)) => CONFIG,
-            RunError::Pulse(ReportingError::Listen(_)) => UNAVAILABLE,
+            RunError::Reporting(ReportingError::Token(_)) => CONFIG,
+            RunError::Reporting(ReportingError::Listen(_)) => UNAVAILABLE,
         });
     }
     if let Some(error) = error.downcast_ref::<ReplayError>() {

@@ -78,7 +78,7 @@ impl Benchmarks {
     }
 
     /// All that has changed is saved.
-    pub(super) fn are_saved(&mut self) {
+    pub(super) fn mark_saved(&mut self) {
         self.changed.clear();
     }
 

@@ -137,7 +137,7 @@ impl Monitor {
             Notice::BatchGoesOn => self.go_on_with_batch(now),
             Notice::LookBack(benchmark) => self.look_back(now, benchmark),
             Notice::Behind { benchmark, time } => self.at_track(benchmark, |track| {
-                track.is_behind(*time);
+                track.fall_behind(*time);
                 Vec::new()
             }),
             Notice::Waits {

@@ -97,7 +97,7 @@ impl Order {
 
     /// It was given before the alerts with these keys were called. What names an alert is of that, and what silences is of
     /// whatever comes.
-    pub fn was_given_before(&mut self, keys: Vec<String>) {
+    pub fn note_called_since(&mut self, keys: Vec<String>) {
         match self {
             Self::Acknowledge {
                 alert: None, given, ..

@@ -140,8 +140,8 @@ impl Monitor {
     }
 
     /// What [`Monitor::save`] gave is kept safely.
-    pub fn is_saved(&mut self) {
-        self.benchmarks.are_saved();
+    pub fn mark_saved(&mut self) {
+        self.benchmarks.mark_saved();
     }
 
     /// The monitor whose [`Monitor::save`] gave these parts, the latest of each name.

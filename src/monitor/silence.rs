@@ -135,7 +135,7 @@ impl Silence {
     }
 
     /// What comes now was measured before `time`, which it is by the clock.
-    pub(super) fn is_behind(&mut self, time: Timestamp) {
+    pub(super) fn fall_behind(&mut self, time: Timestamp) {
         self.behind = Some(time);
         self.delay = self.counted_from().map(|from| time.duration_since(from));
     }
@@ -439,7 +439,7 @@ mod tests {
                 silences.push(now / 24.0);
             }
             if silence.is_silent() || silence.comes_in_batches() {
-                silence.is_behind(at(now));
+                silence.fall_behind(at(now));
             }
             for hour in hours {
                 silence.broken_by(at(f64::from(hour)));

@@ -382,7 +382,7 @@ impl Daemon {
         let committed = self.site.commit((self.host_time)());
         let is_waiting = self.site.is_waiting();
         if committed.is_ok() && !is_waiting && self.holds_nothing() {
-            self.reporting.vitals.has_taken();
+            self.reporting.vitals.note_taken();
             self.sources.acknowledge();
         }
         let (counts, queue) = (self.site.counts(), self.sources.batches.len());

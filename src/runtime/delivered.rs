@@ -73,12 +73,12 @@ impl Delivered {
         let place = alert.event.benchmark.as_ref();
         let place = place.map_or("the site".to_owned(), ToString::to_string);
         let text = format!("{level} ({state}) of {place} was not taken by {how}");
-        self.faults.lasts(FaultPlace::of_hook(hook), &text);
+        self.faults.begin_fault(FaultPlace::of_hook(hook), &text);
     }
 
     /// `hook` takes what it gets.
     pub(super) fn fails_no_more(&self, hook: &str) {
-        self.faults.is_over(&FaultPlace::of_hook(hook));
+        self.faults.end_fault(&FaultPlace::of_hook(hook));
     }
 
     /// Whether nothing more is to be tried with this alert at `hook`: it has taken it, somebody acknowledged or silenced it

@@ -94,11 +94,11 @@ pub struct ReceivedMessage {
 
 /// The acknowledgement that a message waits for.
 #[derive(Debug)]
-pub struct Receipt(Of);
+pub struct Receipt(ReceiptOf);
 
 /// What is acknowledged.
 #[derive(Debug)]
-enum Of {
+enum ReceiptOf {
     Message(Box<BrokerMessage>),
     Number(u64, mpsc::UnboundedSender<u64>),
     /// No message.
@@ -108,7 +108,7 @@ enum Of {
 impl Receipt {
     /// For a broker that is no broker: it gets the number.
     pub fn numbered(number: u64, acknowledged: mpsc::UnboundedSender<u64>) -> Self {
-        Self(Of::Number(number, acknowledged))
+        Self(ReceiptOf::Number(number, acknowledged))
     }
 
     /// Acknowledges the message to the broker, so that it does not come again. Not to be called by the task that runs
@@ -118,13 +118,13 @@ impl Receipt {
     /// When that task, or the connection that the message came by, has ended; the message comes again.
     pub async fn acknowledge(self) -> Result<(), NoConnection> {
         match self.0 {
-            Of::Message(message) => message.acknowledge().await,
-            Of::Number(number, acknowledged) => {
+            ReceiptOf::Message(message) => message.acknowledge().await,
+            ReceiptOf::Number(number, acknowledged) => {
                 // Whoever does not listen any more needs no answer.
                 let _ = acknowledged.send(number);
                 Ok(())
             }
-            Of::Nothing => Ok(()),
+            ReceiptOf::Nothing => Ok(()),
         }
     }
 }
@@ -188,10 +188,10 @@ pub async fn follow(
                 Ok(SessionEvent::SubscriptionRefused) => {
                     let (source, topic) = (&broker.id, &broker.topic);
                     let what = format!("the broker refuses the subscription to {topic:?}: nothing comes from it");
-                    faults.lasts(refused.clone(), &what);
+                    faults.begin_fault(refused.clone(), &what);
                     tracing::error!(source, topic, ?RECONNECT, "the broker refuses the subscription: nothing comes from it");
                     // Asked again after a while: its rules may be others then.
-                    connection.is_ended_by_us();
+                    connection.note_our_end();
                     session.disconnect();
                     if !waits(RECONNECT.1, &mut shutdown).await {
                         return;
@@ -254,10 +254,10 @@ const GRANTS_LESS: &str =
 /// The subscription stands, but not always as it was asked for.
 fn note_granted(faults: &ServiceFaults, refused: &FaultPlace, is_kept: bool) {
     if is_kept {
-        faults.is_over(refused);
+        faults.end_fault(refused);
     } else {
         tracing::warn!(source = refused.source, "the broker {GRANTS_LESS}");
-        faults.lasts(refused.clone(), &format!("the broker {GRANTS_LESS}"));
+        faults.begin_fault(refused.clone(), &format!("the broker {GRANTS_LESS}"));
     }
 }
 
@@ -305,7 +305,7 @@ fn unreceived(source: &str, text: String) -> ReceivedMessage {
         found: Stopwatch::start(),
         quarantined: 0,
         is_retained: false,
-        receipt: Receipt(Of::Nothing),
+        receipt: Receipt(ReceiptOf::Nothing),
         room: None,
     }
 }
@@ -344,7 +344,7 @@ impl Reader {
             found,
             quarantined,
             is_retained: message.is_retained(),
-            receipt: Receipt(Of::Message(Box::new(message))),
+            receipt: Receipt(ReceiptOf::Message(Box::new(message))),
             room: None,
         }
     }

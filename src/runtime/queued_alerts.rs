@@ -77,7 +77,7 @@ impl QueuedAlerts {
     }
 
     /// A run for it begins.
-    pub(super) fn is_tried(&mut self, alert: &Alert) {
+    pub(super) fn note_tried(&mut self, alert: &Alert) {
         if let Some(entry) = self.0.get_mut(&token(alert)) {
             entry.is_tried = true;
         }

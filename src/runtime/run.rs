@@ -40,7 +40,7 @@ pub enum RunError {
     },
     /// The address at which the daemon is asked cannot be used.
     #[error(transparent)]
-    Pulse(#[from] ReportingError),
+    Reporting(#[from] ReportingError),
     /// The part that follows the files broke off.
     #[error("following the files broke off: {0}")]
     Follow(#[from] tokio::task::JoinError),

@@ -2,6 +2,7 @@
 //! written. It stands in the state folder too, for those who ask the state while the daemon runs.
 
 use super::clock;
+use super::locked::locked;
 use crate::reading::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,7 +11,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// In the state folder.
 const FILE: &str = "faults.json";
@@ -154,7 +155,7 @@ pub struct ServiceFaults(Arc<Mutex<Lasting>>);
 
 impl ServiceFaults {
     /// It lasts, and is what `text` says.
-    pub(super) fn lasts(&self, place: FaultPlace, text: &str) {
+    pub(super) fn begin_fault(&self, place: FaultPlace, text: &str) {
         let entry = (text.chars().take(LONGEST_TEXT).collect(), clock::now());
         let mut faults = self.locked();
         let (known, _) = faults.entry(place).or_insert_with(|| entry.clone());
@@ -162,17 +163,17 @@ impl ServiceFaults {
     }
 
     /// It is over, if it ever was.
-    pub(super) fn is_over(&self, place: &FaultPlace) {
+    pub(super) fn end_fault(&self, place: &FaultPlace) {
         self.locked().remove(place);
     }
 
     /// Of files and folders these last, and no others.
-    pub(super) fn are_of_files(&self, now: impl IntoIterator<Item = (FaultPlace, String)>) {
+    pub(super) fn set_file_faults(&self, now: impl IntoIterator<Item = (FaultPlace, String)>) {
         let now: BTreeMap<FaultPlace, String> = now.into_iter().collect();
-        let is_over = |place: &FaultPlace| place.kind.is_of_files() && !now.contains_key(place);
-        self.locked().retain(|place, _| !is_over(place));
+        let is_past = |place: &FaultPlace| place.kind.is_of_files() && !now.contains_key(place);
+        self.locked().retain(|place, _| !is_past(place));
         for (place, text) in now {
-            self.lasts(place, &text);
+            self.begin_fault(place, &text);
         }
     }
 
@@ -214,7 +215,7 @@ impl ServiceFaults {
     }
 
     fn locked(&self) -> MutexGuard<'_, Lasting> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.0)
     }
 }
 
@@ -286,16 +287,16 @@ mod tests {
     #[test]
     fn what_is_over_goes_and_what_lasts_keeps_its_beginning() {
         let faults = ServiceFaults::default();
-        faults.lasts(broker(), "refused");
-        faults.are_of_files((0..3).map(file));
+        faults.begin_fault(broker(), "refused");
+        faults.set_file_faults((0..3).map(file));
         let since = faults.shown()[0].since;
-        faults.lasts(broker(), "no route");
-        faults.are_of_files([file(1)]);
+        faults.begin_fault(broker(), "no route");
+        faults.set_file_faults([file(1)]);
         let shown = faults.shown();
         assert_eq!((shown.len(), shown[0].since), (2, since));
         assert_eq!(shown[0].text, "no route");
-        faults.is_over(&broker());
-        faults.lasts(FaultPlace::of_state(), "full");
+        faults.end_fault(&broker());
+        faults.begin_fault(FaultPlace::of_state(), "full");
         faults.forget_sources();
         assert_eq!(faults.counts().len(), 1);
     }
@@ -305,7 +306,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(faults_in(folder.path()), []);
         let faults = ServiceFaults::default();
-        faults.are_of_files((0..500).map(file));
+        faults.set_file_faults((0..500).map(file));
         assert_eq!(faults.counts().into_values().collect::<Vec<_>>(), [500]);
         write(folder.path(), &faults.shown()).unwrap();
         let read = faults_in(folder.path());

@@ -20,7 +20,7 @@ pub fn pair() -> (Trigger, Shutdown) {
 
 impl Trigger {
     /// Asks for the stop.
-    pub fn pull(&self) {
+    pub fn request(&self) {
         self.0.send_replace(true);
     }
 }
@@ -51,7 +51,7 @@ impl Shutdown {
                 _ = interrupt.recv() => "SIGINT",
             };
             tracing::info!(signal = name, "stopping");
-            trigger.pull();
+            trigger.request();
         });
         Ok(shutdown)
     }

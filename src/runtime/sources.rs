@@ -28,8 +28,8 @@ const AFTER_FAILURE: Duration = Duration::from_secs(10);
 /// A broker that cannot be reached within this time, or does not answer, is not waited for.
 const LONGEST_SILENT: Duration = Duration::from_secs(30);
 
-/// What listening to a broker needs.
-struct Listening {
+/// What following a broker needs.
+struct MqttFollower {
     broker: Broker,
     benchmarks: Vec<Benchmark>,
     messages: mpsc::Sender<ReceivedMessage>,
@@ -38,9 +38,9 @@ struct Listening {
     stopped: Shutdown,
 }
 
-impl Listening {
-    /// Listens until it is asked to stop, also where the program fails meanwhile: it then begins anew.
-    async fn keep_on(mut self) {
+impl MqttFollower {
+    /// Follows until it is asked to stop, also where the program fails meanwhile: it then begins anew.
+    async fn run(mut self) {
         let follow = |one: &Self| {
             tokio::spawn(mqtt::follow(
                 one.broker.clone(),
@@ -57,7 +57,7 @@ impl Listening {
             let text =
                 "the program failed while it took messages, and begins anew: the log says where";
             let place = FaultPlace::of_source(ServiceFaultKind::BrokerUnreachable, source);
-            self.faults.lasts(place, text);
+            self.faults.begin_fault(place, text);
             tokio::select! {
                 () = tokio::time::sleep(AFTER_FAILURE) => {}
                 () = self.stopped.requested() => return,
@@ -149,7 +149,7 @@ impl Sources {
 
     /// Asks them to stop; what they have read already can still be taken.
     pub(super) fn stop(&self) {
-        self.stop.pull();
+        self.stop.request();
     }
 
     /// Waits for their end.
@@ -222,7 +222,7 @@ impl Sources {
             let client = known.get(&broker.id).cloned();
             let is_known = client.is_some();
             let subscription = Subscription::new(client.unwrap_or_else(fresh), is_known);
-            let listening = Listening {
+            let follower = MqttFollower {
                 broker: broker.clone(),
                 benchmarks: config.benchmarks.clone(),
                 messages: self.messages.clone(),
@@ -230,7 +230,7 @@ impl Sources {
                 subscription: subscription.clone(),
                 stopped: stopped.clone(),
             };
-            tokio::spawn(listening.keep_on());
+            tokio::spawn(follower.run());
             self.subscriptions.push((broker.id.clone(), subscription));
         }
         let is_gone = |source: &String| config.brokers.iter().all(|broker| broker.id != *source);

@@ -210,8 +210,8 @@ impl Inner {
     }
 }
 
-/// Writes the steps of `batch` behind number `last`, with the series that are not in the first of `catalogues` yet: these into the
-/// second too. The number of the last.
+/// Writes the steps of `batch` behind number `last`, with the series that are not in `catalogue` yet: these into `fresh`
+/// too. The number of the last.
 fn insert_steps(
     connection: &Connection,
     mut last: i64,

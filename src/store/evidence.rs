@@ -28,7 +28,7 @@ pub struct DeliveryRow {
     pub hook: String,
     /// The level that was reported.
     pub level: String,
-    /// `firing` or `resolved`.
+    /// `firing`, `resolved` or `correction`.
     pub state: String,
     /// `waiting`, `delivered`, `over`, `dead`, `closed`, `acknowledged` or `silenced`.
     pub status: String,

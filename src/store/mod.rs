@@ -305,7 +305,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn is_at_work(&self) -> Result<(), StoreError> {
+    pub fn clear_copy_mark(&self) -> Result<(), StoreError> {
         let delete = "DELETE FROM meta WHERE name = ?1";
         self.inner().connection.execute(delete, [COPY])?;
         Ok(())

@@ -28,7 +28,7 @@ pub struct Delivery {
     pub key: String,
     /// Its level.
     pub level: String,
-    /// Firing or resolved.
+    /// Firing, resolved or correction.
     pub state: String,
     /// The hook.
     pub hook: String,
@@ -127,7 +127,7 @@ impl Delivery {
 
     /// It was noted when it was for the first hook of all: an escalation counts its time from there, whatever command line its hook
     /// has meanwhile.
-    fn is_noted_as_others(&self, connection: &Connection) -> Result<(), StoreError> {
+    fn note_as_others(&self, connection: &Connection) -> Result<(), StoreError> {
         let Self {
             key,
             level,
@@ -401,7 +401,7 @@ impl Inner {
         let transaction = self.connection.transaction()?;
         for delivery in instead {
             delivery.insert(&transaction, WAITING)?;
-            delivery.is_noted_as_others(&transaction)?;
+            delivery.note_as_others(&transaction)?;
         }
         for delivery in singly {
             delivery.insert(&transaction, WAITING)?;

@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn the_line_is_drawn_where_the_readings_give_the_one_that_was_told_and_not_elsewhere() {
+    fn the_line_is_drawn_where_the_readings_give_the_one_that_was_reported_and_not_elsewhere() {
         let series = series();
         let forecast = forecast(Some(40), Some(49), Some(60));
         let lines = |zero: Timestamp| {

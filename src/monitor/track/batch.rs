@@ -21,7 +21,7 @@ impl Track {
             return Vec::new();
         };
         if self.quality.is_stuck() {
-            self.pending.is_judged();
+            self.pending.mark_judged();
             return Vec::new();
         }
         let mut events = self.judge(policy, time, context);

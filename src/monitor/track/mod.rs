@@ -286,7 +286,7 @@ impl Track {
         forecast: Option<Forecast>,
         context: &StepContext<'_>,
     ) -> Vec<Event> {
-        self.pending.is_judged();
+        self.pending.mark_judged();
         let mut events = Vec::new();
         if let Some(forecast) = &forecast {
             events.extend(self.refit(policy, time, forecast));

@@ -95,8 +95,8 @@ impl Track {
     }
 
     /// What comes now was measured long before `time`, which it is by the clock.
-    pub(in crate::monitor) fn is_behind(&mut self, time: Timestamp) {
-        self.record.is_behind(time);
+    pub(in crate::monitor) fn fall_behind(&mut self, time: Timestamp) {
+        self.record.fall_behind(time);
     }
 
     /// What time it was when one came that was measured long before.

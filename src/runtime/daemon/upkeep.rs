@@ -35,7 +35,7 @@ impl Daemon {
             return Ok(());
         }
         self.report("state-restored", restored::TEXT.to_owned())?;
-        self.store.is_at_work()
+        self.store.clear_copy_mark()
     }
 
     fn note_quarantined(&mut self) -> Result<(), StoreError> {
@@ -73,13 +73,13 @@ impl Daemon {
             Some(error) => error.to_string(),
             None if is_waiting => "there is no room on the disk".to_owned(),
             None if !is_in_place => "its folder or its files are gone".to_owned(),
-            None => return faults.is_over(&FaultPlace::of_state()),
+            None => return faults.end_fault(&FaultPlace::of_state()),
         };
         let levels = self.levels_in_memory();
         let text = format!(
             "the state cannot be written ({why}): what comes waits unacknowledged, alerts go out from memory; in force there: {levels}"
         );
-        faults.lasts(FaultPlace::of_state(), &text);
+        faults.begin_fault(FaultPlace::of_state(), &text);
     }
 
     /// Where orange or red is in force.

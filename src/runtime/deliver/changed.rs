@@ -29,7 +29,7 @@ impl Dispatcher {
         });
         let known: Vec<Option<HookQueue>> = known.collect();
         for way in former {
-            self.part_with(way, limit);
+            self.stop_worker(way, limit);
         }
         for (hook, known) in hooks.iter().zip(known) {
             let way = known.unwrap_or_else(|| {
@@ -42,7 +42,7 @@ impl Dispatcher {
     }
 
     /// Nothing more comes for this hook.
-    fn part_with(&mut self, way: HookQueue, limit: Duration) {
+    fn stop_worker(&mut self, way: HookQueue, limit: Duration) {
         let name = way.hook.name();
         way.changes.send_replace(None);
         self.leaving.insert(name.clone(), way.ended);

@@ -20,6 +20,7 @@ pub use runner::{Processes, Runner, Senders, run};
 
 use super::delivered::Delivered;
 use super::hook::{Alert, MessageState, state_name};
+use super::locked::locked;
 use super::queued_alerts::QueuedAlerts;
 use crate::alert::Level;
 use crate::config::HookConfig;
@@ -30,7 +31,7 @@ use repeat::Repetition;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::{AbortHandle, JoinSet};
@@ -300,7 +301,7 @@ impl Dispatcher {
     }
 
     /// What `alert` reports is over: it is not tried any more.
-    pub(super) fn is_over(&self, alert: &Alert) {
+    pub(super) fn stop_trying(&self, alert: &Alert) {
         for way in &self.hooks {
             locked(&way.queued).end(alert);
         }
@@ -457,10 +458,6 @@ impl HookConfig {
         };
         is_of_our_levels && is_ours && is_of_ours
     }
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

@@ -200,7 +200,7 @@ impl Worker {
         };
         self.untried -= usize::from(waiting.is_new);
         self.break_off(&waiting.alert);
-        locked(&self.queued).is_tried(&waiting.alert);
+        locked(&self.queued).note_tried(&waiting.alert);
         let (hook, alert) = (Arc::clone(&self.hook), waiting.alert.clone());
         let task = tokio::spawn(self.runner.run(hook, alert, waiting.attempt));
         self.running.push(Running {

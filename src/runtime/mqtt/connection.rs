@@ -49,12 +49,12 @@ impl Connection {
         let (faults, place) = (self.faults.clone(), self.place.clone());
         self.settling.spawn(async move {
             tokio::time::sleep(STEADY).await;
-            faults.is_over(&place);
+            faults.end_fault(&place);
         });
     }
 
     /// We end it ourselves: the broker has been reached.
-    pub(super) fn is_ended_by_us(&mut self) {
+    pub(super) fn note_our_end(&mut self) {
         self.is_over = true;
     }
 
@@ -63,7 +63,7 @@ impl Connection {
         self.settling.abort_all();
         if std::mem::take(&mut self.is_over) {
             self.since = None;
-            return self.faults.is_over(&self.place);
+            return self.faults.end_fault(&self.place);
         }
         self.short = match self.since.take() {
             Some(since) if since.elapsed() < STEADY => self.short + 1,
@@ -79,6 +79,6 @@ impl Connection {
             String::new()
         };
         let text = format!("no connection to {host}:{port}: {error}{taken}");
-        self.faults.lasts(self.place.clone(), &text);
+        self.faults.begin_fault(self.place.clone(), &text);
     }
 }

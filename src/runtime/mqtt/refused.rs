@@ -49,8 +49,8 @@ impl RefusedTopics {
     pub(super) fn report(&mut self, faults: &ServiceFaults, place: &FaultPlace) {
         if std::mem::take(&mut self.is_news) {
             match self.fault() {
-                Some(text) => faults.lasts(place.clone(), &text),
-                None => faults.is_over(place),
+                Some(text) => faults.begin_fault(place.clone(), &text),
+                None => faults.end_fault(place),
             }
         }
     }

@@ -70,7 +70,7 @@ impl MergedReadings {
         let mut seen = BTreeSet::from([first.value.to_bits()]);
         for one in others {
             if seen.insert(one.value.to_bits()) {
-                self.is_corrected(newest, *one);
+                self.correct(newest, *one);
                 newest = *one;
             } else {
                 self.repeated += 1;
@@ -79,13 +79,13 @@ impl MergedReadings {
         let last = *all.last()?;
         if last.value.to_bits() != newest.value.to_bits() {
             self.repeated -= 1;
-            self.is_corrected(newest, last);
+            self.correct(newest, last);
             newest = last;
         }
         Some(newest)
     }
 
-    fn is_corrected(&mut self, before: ReadValue, by: ReadValue) {
+    fn correct(&mut self, before: ReadValue, by: ReadValue) {
         self.corrected += 1;
         self.first.get_or_insert((by, before.value));
     }

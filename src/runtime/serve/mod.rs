@@ -152,7 +152,7 @@ impl Server {
 
     /// Ends it; what is being answered is broken off.
     pub async fn stop(self) {
-        self.stop.pull();
+        self.stop.request();
         if let Err(error) = self.task.await {
             tracing::error!(%error, "the server broke off");
         }

@@ -187,17 +187,17 @@ async fn changes(State(reader): State<Arc<SiteReader>>, Query(since): Query<Sinc
         reader,
         event: since.since,
         step: None,
-        looks: 0,
+        polls: 0,
         is_behind: false,
     };
     let parts = stream::unfold(place, |mut place| async move {
-        if place.looks == MOST_POLLS {
+        if place.polls == MOST_POLLS {
             return None;
         }
-        if place.looks > 0 && !place.is_behind {
+        if place.polls > 0 && !place.is_behind {
             tokio::time::sleep(POLL_INTERVAL).await;
         }
-        place.looks += 1;
+        place.polls += 1;
         let (place, text) = blocking(&READING, move || {
             let text = place.look()?;
             Ok((place, text))
@@ -219,7 +219,7 @@ struct StreamPosition {
     /// The last event; `None`: only what comes from now on is sent.
     event: Option<i64>,
     step: Option<i64>,
-    looks: u32,
+    polls: u32,
     /// Whether there is more to send than one round sends.
     is_behind: bool,
 }

@@ -140,7 +140,7 @@ impl Site {
                 }
                 self.batch.clear();
                 if saves {
-                    self.monitor.is_saved();
+                    self.monitor.mark_saved();
                     self.steps_since_memory = 0;
                 }
                 Ok(())

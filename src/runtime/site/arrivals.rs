@@ -86,7 +86,7 @@ impl Site {
             return Ok(self.step(self.data_now(), &arrival.input));
         }
         if let Input::Reading { benchmark, .. } = &arrival.input {
-            self.waiting.are_taken(benchmark, arrival.time);
+            self.waiting.remove_up_to(benchmark, arrival.time);
         }
         if self.is_set_aside(arrival, host_time) {
             return Ok(Vec::new());
@@ -361,7 +361,7 @@ impl Site {
         self.prove(host_time);
         let mut events = Vec::new();
         // Before the first reading there is no past that could be over.
-        let is_read = self.read.count() > 0 && !self.is_short_rush();
+        let is_read = self.read.count() > 0 && !self.is_short_burst();
         for _ in 0..MOST_JUDGED {
             if is_read && self.monitor.owes_current() {
                 events.extend(self.judge_current());

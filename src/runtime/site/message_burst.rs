@@ -26,7 +26,7 @@ const HISTORY: SignedDuration = SignedDuration::from_hours(24);
 
 /// How fast messages came of late.
 #[derive(Debug, Default)]
-pub(super) struct MessageRush {
+pub(super) struct MessageBurst {
     /// Since when they are counted, and how many came since then.
     counted: Option<(Stopwatch, usize)>,
     /// When so many came for the first time and for the last.
@@ -41,21 +41,21 @@ impl Site {
     /// A message is about to be taken, and so many wait behind it.
     pub fn messages_come(&mut self, waiting: usize) {
         let now = Stopwatch::start();
-        let counted = self.rush.counted;
+        let counted = self.burst.counted;
         let (since, before) = counted
             .filter(|(since, _)| since.elapsed() <= WINDOW)
             .unwrap_or((now, 0));
         let count = before + 1;
-        self.rush.counted = Some((since, count));
+        self.burst.counted = Some((since, count));
         if count + waiting >= MANY {
-            let first = self.rush.came.map_or(now, |(first, _)| first);
-            self.rush.came = Some((first, now));
+            let first = self.burst.came.map_or(now, |(first, _)| first);
+            self.burst.came = Some((first, now));
         }
     }
 
     /// Where messages come faster than they can be judged, what they hold from here on is judged at [`Site::end_batch`].
     pub fn queue(&mut self) {
-        if self.is_rush() {
+        if self.is_burst() {
             self.begin_queue();
         }
     }
@@ -71,20 +71,20 @@ impl Site {
         if self.monitor.queues() || self.monitor.reads_all_past() {
             return;
         }
-        self.rush.queues = Some((Stopwatch::start(), self.counts.taken));
+        self.burst.queues = Some((Stopwatch::start(), self.counts.taken));
         self.step(self.data_now(), &Input::Notice(Notice::Queue));
     }
 
     /// Whether values have queued and may queue further.
     pub fn may_queue_on(&self) -> bool {
-        let queues = self.rush.queues.filter(|_| self.monitor.queues());
+        let queues = self.burst.queues.filter(|_| self.monitor.queues());
         queues.is_some_and(|(since, taken)| {
             since.elapsed() < LONGEST_QUEUE && self.counts.taken - taken < MOST_QUEUED
         })
     }
 
-    fn is_rush(&self) -> bool {
-        let came = self.rush.came;
+    fn is_burst(&self) -> bool {
+        let came = self.burst.came;
         came.is_some_and(|(_, last)| last.elapsed() <= WINDOW)
     }
 
@@ -92,10 +92,10 @@ impl Site {
     pub fn judge_meanwhile(&mut self) -> Vec<Event> {
         let mut events = Vec::new();
         if !self.monitor.reads_past() {
-            self.rush.reads_past = None;
+            self.burst.reads_past = None;
             return events;
         }
-        let since = *self.rush.reads_past.get_or_insert_with(Stopwatch::start);
+        let since = *self.burst.reads_past.get_or_insert_with(Stopwatch::start);
         if since.elapsed() < LONGEST {
             return events;
         }
@@ -104,7 +104,7 @@ impl Site {
         while self.monitor.owes_current() {
             events.extend(self.judge_current());
         }
-        self.rush.reads_past = None;
+        self.burst.reads_past = None;
         let now = self.data_now();
         let again = if is_of_all {
             vec![Notice::Past]
@@ -135,8 +135,8 @@ impl Site {
     }
 
     /// Whether more are to be expected at once.
-    pub(super) fn is_short_rush(&self) -> bool {
-        let came = self.rush.came;
-        self.is_rush() && came.is_some_and(|(first, _)| first.elapsed() <= LONGEST)
+    pub(super) fn is_short_burst(&self) -> bool {
+        let came = self.burst.came;
+        self.is_burst() && came.is_some_and(|(first, _)| first.elapsed() <= LONGEST)
     }
 }

@@ -8,7 +8,7 @@ mod alerts;
 mod arrivals;
 mod flood;
 mod memory;
-mod message_rush;
+mod message_burst;
 mod mutes;
 mod read_times;
 mod returned;
@@ -23,7 +23,7 @@ pub(super) use arrivals::{Untimely, untimely};
 pub(super) use mutes::announce_ends;
 pub(super) use unproven::Unproven;
 
-use message_rush::MessageRush;
+use message_burst::MessageBurst;
 use mutes::Mutes;
 use read_times::ReadTimes;
 use returned::Returned;
@@ -123,7 +123,7 @@ pub struct Site {
     /// Values that were taken before, and corrected: until all that came with them has been seen.
     returned: Returned,
     /// Messages that come so fast that the past is not over yet.
-    rush: MessageRush,
+    burst: MessageBurst,
     agreeing: Agreeing,
     /// Runs since something came late of which more may come in the next batch.
     batch_goes_on: Option<Stopwatch>,
@@ -153,7 +153,7 @@ impl Site {
             held: VecDeque::new(),
             waiting: WaitingReadings::default(),
             returned: Returned::default(),
-            rush: MessageRush::default(),
+            burst: MessageBurst::default(),
             agreeing: Agreeing::default(),
             batch_goes_on: None,
         }
@@ -258,7 +258,7 @@ impl Site {
         let mut order = left.order;
         if let Some(last) = left.last_event {
             let since = self.called_since(last, order.benchmark())?;
-            order.was_given_before(since);
+            order.note_called_since(since);
         }
         self.shorten(&mut order);
         self.batch.taken(left.number);
@@ -297,7 +297,7 @@ impl Site {
         ended.retain(|id| settings.watched.ends(id, former));
         for id in ended {
             self.batch.forget(&id);
-            self.read.are_read_anew(id, last);
+            self.read.forget_read(id, last);
         }
     }
 

@@ -74,7 +74,7 @@ impl ReadTimes {
     }
 
     /// The readings of a benchmark up to step number `last` do not count any more.
-    pub(super) fn are_read_anew(&mut self, benchmark: BenchmarkId, last: i64) {
+    pub(super) fn forget_read(&mut self, benchmark: BenchmarkId, last: i64) {
         self.read_anew.insert(benchmark, last);
     }
 
@@ -166,7 +166,7 @@ mod tests {
         let (mut times, id) = (ReadTimes::default(), BenchmarkId::new("5"));
         times.note(&id, hour(3), hour(3));
         assert_eq!(times.anew_after(Some(&id)), 0);
-        times.are_read_anew(id.clone(), 17);
+        times.forget_read(id.clone(), 17);
         times.retain(|_| false);
         assert_eq!(times.anew_after(Some(&id)), 17);
         assert!(times.is_latest(&id, hour(1)));

@@ -30,7 +30,7 @@ impl Site {
         if let Some(alerts) = &self.sinks.alerts {
             for one in self.standing.floods() {
                 if !self.standing.has_in_force(&one.alert) {
-                    alerts.is_over(&one.alert);
+                    alerts.stop_trying(&one.alert);
                 }
             }
         }

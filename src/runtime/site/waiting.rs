@@ -12,7 +12,7 @@ pub(super) struct WaitingReadings(BTreeMap<BenchmarkId, BTreeSet<Timestamp>>);
 
 impl WaitingReadings {
     /// One of `time` waits no more, nor do earlier ones.
-    pub(super) fn are_taken(&mut self, benchmark: &BenchmarkId, time: Timestamp) {
+    pub(super) fn remove_up_to(&mut self, benchmark: &BenchmarkId, time: Timestamp) {
         if let Some(times) = self.0.get_mut(benchmark) {
             times.retain(|one| *one > time);
             if times.is_empty() {

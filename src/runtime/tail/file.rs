@@ -101,7 +101,7 @@ pub(super) struct Departed {
 #[derive(Debug)]
 pub(super) enum Content {
     Text(Box<TextReader>),
-    /// A packed file, that is read once.
+    /// A packed file, that is read whole, again when it has grown.
     Packed(Box<Unpacking>),
     Mcap {
         channels: Channels,

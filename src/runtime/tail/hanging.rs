@@ -285,7 +285,7 @@ mod tests {
             .create(true)
             .open(&path)
             .unwrap();
-        write!(logger, "{HEADER}2020-01-01T00:00:00Z,1\n").unwrap();
+        writeln!(logger, "{HEADER}2020-01-01T00:00:00Z,1").unwrap();
         let mut files = FollowedFiles::new(&config.sources, &config.benchmarks, Vec::new());
         let readers = Box::new(files.readers());
         let (readers, batch) = look(&mut files, readers).await;
@@ -297,13 +297,13 @@ mod tests {
         writeln!(logger, "2020-01-01T01:00:00Z,2").unwrap();
         let readers = Box::new(files.readers());
         let (_, batch) = look(&mut files, readers).await;
-        let taken = batch.arrivals.iter().map(|one| &one.input);
-        let taken: Vec<_> = taken
-            .map(|input| match input {
-                Input::Reading { reading, .. } => reading.value,
-                other => panic!("{other:?}"),
-            })
-            .collect();
+        let mut taken = Vec::new();
+        for arrival in &batch.arrivals {
+            let Input::Reading { reading, .. } = &arrival.input else {
+                panic!("{arrival:?}");
+            };
+            taken.push(reading.value);
+        }
         assert_eq!(taken, [2.0]);
         assert!(batch.quarantined.is_empty(), "{:?}", batch.quarantined);
     }

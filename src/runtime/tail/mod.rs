@@ -1,4 +1,4 @@
-//! Follows growing files: text line by line, MCAP record by record; packed ones are read once.
+//! Follows growing files: text line by line, MCAP record by record; packed ones are read whole.
 //!
 //! [`lines`] and [`records`] are pure; [`Follower`] reads files when asked; [`follow`] is the
 //! asynchronous shell that asks: when a watched folder changes, and every two seconds in any case,
@@ -88,7 +88,7 @@ pub async fn follow(
                 readers = Box::new(files.readers());
                 // Those of other files last until these have been read again.
                 for (place, text) in files.faults() {
-                    faults.lasts(place, &text);
+                    faults.begin_fault(place, &text);
                 }
                 if shutdown.is_requested() {
                     return Ok(());
@@ -96,7 +96,7 @@ pub async fn follow(
                 continue;
             }
         };
-        faults.are_of_files(readers.follower.faults().into_iter().chain(files.faults()));
+        faults.set_file_faults(readers.follower.faults().into_iter().chain(files.faults()));
         let wake = Arc::clone(readers.watch.wake());
         let rest = (REST * looking.elapsed()).clamp(SHORTEST_REST, LONGEST_REST);
         let rested = clock::later(rest);

@@ -40,7 +40,7 @@ impl Levels {
     }
 
     /// Those so far say nothing of the slope.
-    pub(super) fn are_void(&mut self) {
+    pub(super) fn void(&mut self) {
         self.void_until = self.changes.back().map(|(time, _)| *time);
     }
 
@@ -93,7 +93,7 @@ mod tests {
         assert!(!own.was_red_since(at(8)));
         own.go_on_from(of(&[(5, Level::Red), (12, Level::Green)]));
         assert!(own.was_red_since(at(8)) && !own.was_red_since(at(13)));
-        own.are_void();
+        own.void();
         assert!(!own.was_red_since(at(8)));
     }
 }

@@ -196,7 +196,7 @@ impl Alarm {
     pub(super) fn follow_on(&mut self, former: Self) {
         self.latch = former.latch.measured_otherwise();
         (self.levels, self.kept) = (former.levels, former.kept);
-        self.levels.are_void();
+        self.levels.void();
     }
 
     /// That the level in force ends because the benchmark is no longer watched.

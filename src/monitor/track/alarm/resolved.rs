@@ -28,7 +28,7 @@ impl Alarm {
         self.latch.resolve(now);
         self.levels.note(now, &self.latch);
         if level == Level::Red {
-            self.levels.are_void();
+            self.levels.void();
         }
         (self.attention_until, self.kept, self.overdue) = (None, None, None);
         self.occurrences.end();

@@ -84,7 +84,7 @@ impl Pending {
     }
 
     /// All readings have been judged.
-    pub(super) fn is_judged(&mut self) {
+    pub(super) fn mark_judged(&mut self) {
         (self.has_unjudged_late, self.queued_since) = (false, None);
     }
 
@@ -124,7 +124,7 @@ mod tests {
         assert!(!pending.is_long_queued(&policy, at(3)) && pending.is_long_queued(&policy, at(4)));
         pending.queue_anew(at(2));
         assert!(!pending.is_long_queued(&policy, at(4)) && pending.has_unjudged());
-        pending.is_judged();
+        pending.mark_judged();
         assert!(!pending.has_unjudged());
         pending.note_unjudged_late();
         assert!(pending.has_unjudged() && !pending.is_queued());

@@ -199,8 +199,8 @@ impl BenchmarkRecord {
     }
 
     /// What comes now was measured long before `time`, which it is by the clock.
-    pub(super) fn is_behind(&mut self, time: Timestamp) {
-        self.silence.is_behind(time);
+    pub(super) fn fall_behind(&mut self, time: Timestamp) {
+        self.silence.fall_behind(time);
     }
 
     /// What time it was when one came that was measured long before.
