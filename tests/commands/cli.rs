@@ -345,7 +345,7 @@ fn a_replay_up_to_a_time_is_the_beginning_of_the_whole_one() {
 }
 
 #[test]
-fn a_replay_tells_the_hooks_that_it_is_an_exercise_and_tells_them_every_alert() {
+fn a_replay_notifies_the_hooks_that_it_is_an_exercise_and_of_every_alert() {
     let folder = tempfile::tempdir().unwrap();
     let (config, _) = site(folder.path());
     let mut text = fs::read_to_string(&config).unwrap();

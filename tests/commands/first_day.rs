@@ -262,7 +262,7 @@ fn the_end_of_an_alert_that_falls_into_a_silence_is_sent_after_it_and_a_red_keep
 
 /// As somebody who is not the daemon's user: in a shell of their own, or by a cron job.
 #[test]
-fn who_may_not_read_the_state_is_told_which_path_and_whose_it_is() {
+fn who_may_not_read_the_state_learns_which_path_and_whose_it_is() {
     let office = Office::with(&[
         ("slope.csv", &plain(30)),
         ("site.toml", &site("slope.csv", "")),

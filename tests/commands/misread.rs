@@ -270,7 +270,7 @@ fn check_says_how_rain_is_taken_and_where_it_is_a_total_of_each_day() {
 }
 
 #[test]
-fn a_header_without_rows_is_no_riddle_and_messages_may_change_their_unit() {
+fn a_header_without_rows_is_refused_and_messages_may_change_their_unit() {
     let office = Office::with(&[("slope.csv", "time,P1_displacement_mm\n")]);
     let said = office.refused(2, &["init", "slope.csv"]);
     contains_all(&said, &["a header and no row below it", "run init again"]);

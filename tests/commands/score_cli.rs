@@ -32,15 +32,19 @@ fn a_scorecard_says_for_each_lead_and_method_how_far_it_was_off_and_what_it_knew
         let known: jiff::Timestamp = lead["known_until"].as_str().unwrap().parse().unwrap();
         let days = (failure.as_second() - known.as_second()) as f64 / 86_400.0;
         assert!(days >= lead["lead_days"].as_f64().unwrap() - 1e-6, "{lead}");
+        // One that expects no collapse is the furthest off.
+        let furthest = lead["scores"]["persistence"]["crps_days"].as_f64().unwrap();
         for method in methods {
             let score = &lead["scores"][method.as_str().unwrap()];
-            assert!(score["crps_days"].as_f64().unwrap() >= 0.0, "{score}");
+            let crps = score["crps_days"].as_f64().unwrap();
+            assert!((0.0..=furthest).contains(&crps), "{score} {furthest}");
             assert!((0.0..=1.0 + 1e-9).contains(&score["probability"].as_f64().unwrap()));
         }
     }
     let ten = leads.iter().find(|lead| lead["lead_days"] == 10.0).unwrap();
     let panel = &ten["scores"]["panel"];
     assert!(panel["error_days"].as_f64().unwrap().abs() < 3.0, "{panel}");
+    assert!(panel["crps_days"].as_f64().unwrap() < 3.0, "{panel}");
     assert_eq!(panel["covered"], true);
     assert!(card["warning"]["hours_at"]["red"].as_f64().unwrap() > 0.0);
     assert!(card["warning"]["first_red"].is_string());

@@ -547,7 +547,7 @@ impl Daemon {
     }
 
     async fn stop(self) -> Counts {
-        self.trigger.pull();
+        self.trigger.request();
         let ended = tokio::time::timeout(LIMIT, self.task).await;
         ended.expect("no end").unwrap().unwrap()
     }

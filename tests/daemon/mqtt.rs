@@ -223,7 +223,7 @@ impl Source {
     }
 
     async fn end(self) {
-        self.stop.pull();
+        self.stop.request();
         self.task.await.unwrap();
     }
 }
@@ -542,7 +542,7 @@ async fn messages_of_many_lines_wait_at_the_broker_until_those_before_have_been_
         drop(delivery.room);
         delivery.receipt.acknowledge().await.unwrap();
     }
-    stop.pull();
+    stop.request();
     task.await.unwrap();
 }
 

@@ -235,7 +235,7 @@ fn the_silence_of_the_whole_site_is_not_ended_for_one_benchmark_without_a_word()
 }
 
 #[test]
-fn the_stream_tells_each_event_once_with_its_number_and_ends_by_itself() {
+fn the_stream_gives_each_event_once_with_its_number_and_ends_by_itself() {
     let site = Site::start();
     let request = format!(
         "GET /api/stream?since=0 HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nAuthorization: Bearer {TOKEN}\r\n\r\n",

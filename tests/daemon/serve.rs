@@ -428,7 +428,7 @@ impl Drop for Daemon {
 }
 
 #[test]
-fn a_running_daemon_tells_of_its_readings_to_whoever_has_the_token() {
+fn a_running_daemon_reports_its_readings_to_whoever_has_the_token() {
     let (folder, file) = site("0.0.0.0:0", "token_file = \"token\"\n");
     let mut text = b"time,5_displacement_mm\n".to_vec();
     for day in 1..=12 {
@@ -477,7 +477,7 @@ fn figure(metrics: &str, name: &str) -> f64 {
 }
 
 #[test]
-fn a_running_daemon_tells_how_long_values_wait_what_it_cannot_use_and_what_no_hook_takes() {
+fn a_running_daemon_reports_how_long_values_wait_what_it_cannot_use_and_what_no_hook_takes() {
     let (folder, file) = site("127.0.0.1:0", "");
     let refused = fs::read_to_string(&file).unwrap().replace("true", "false");
     let threshold = "[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"50 mm\"\n";

@@ -1,4 +1,4 @@
-//! What the daemon tells a service manager, on a real socket.
+//! What the daemon reports to a service manager, on a real socket.
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -20,7 +20,7 @@ impl Drop for Killed {
 }
 
 #[test]
-fn the_service_manager_hears_of_readiness_the_work_loop_and_the_stop() {
+fn the_service_manager_is_notified_of_readiness_the_work_loop_and_the_stop() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::create_dir(at.join("incoming")).unwrap();

@@ -1,7 +1,7 @@
 //! 17: a database that must not be touched.
 
+use crate::notified::failing;
 use crate::site::{Site, command, eventually, get, has_own_mounts};
-use crate::telling::failing;
 use rusqlite::Connection;
 use std::fs;
 

@@ -1,7 +1,7 @@
 //! Hours: an alert outside of a hook's hours waits for the next shift. The hooks are processes.
 
+use crate::notified::failing;
 use crate::site::{Site, eventually};
-use crate::telling::failing;
 use jiff::{SignedDuration, Timestamp, tz::TimeZone};
 use slipwatch::runtime::clock;
 

@@ -1,7 +1,7 @@
 //! Escalation: who is notified when nobody acknowledges in time. The hooks are processes, and the daemon stops and starts in between.
 
+use crate::notified::failing;
 use crate::site::{Program, Site, eventually};
-use crate::telling::failing;
 
 /// A site with a second hook, which is to be run so long after an alert that nobody has acknowledged.
 fn site(after: &str) -> Site {

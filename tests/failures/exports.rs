@@ -1,8 +1,8 @@
 //! Exports that are issued again, whole and in any order, and what a reload changes of what is called.
 
+use crate::notified::failing;
 use crate::reread::{FAR, HEADER, POLICY, THRESHOLD, benchmark, reload, rows_of};
 use crate::site::{Site, eventually};
-use crate::telling::failing;
 use jiff::SignedDuration;
 use slipwatch::runtime::clock;
 use std::fs;

@@ -1,7 +1,7 @@
 //! What comes in and cannot be used: it stops nothing else, and nothing of it is silent.
 
+use crate::notified::failing;
 use crate::site::{Site, eventually};
-use crate::telling::failing;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use nix::sys::signal::Signal;
@@ -11,7 +11,7 @@ use std::io::Write;
 const HEADER: &str = "time,displacement_mm\n";
 const POLICY: &str = "[alert]\nevacuation_time = \"3h\"\n";
 
-/// With a file in its folder that never gives anything, a site tells its red, takes a new config, and stops.
+/// With a file in its folder that never gives anything, a site reports its red, takes a new config, and stops.
 fn goes_on(site: &Site) {
     site.append("incoming/5.csv", HEADER);
     let program = site.start(&[]);

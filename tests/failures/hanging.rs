@@ -2,8 +2,8 @@
 //! calls wait as that does.
 
 use crate::machine::of;
+use crate::notified::failing;
 use crate::site::{Program, Site, command, eventually};
-use crate::telling::failing;
 use nix::sys::signal::Signal;
 use std::fs;
 use std::path::Path;

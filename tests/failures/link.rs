@@ -1,7 +1,7 @@
 //! The link in an alert's own message: what it acknowledges, once, and what it does not. The daemon is a process, asked on a socket.
 
+use crate::notified::failing;
 use crate::site::{Program, Site, eventually, get};
-use crate::telling::failing;
 use base64::Engine;
 use base64::engine::general_purpose::{STANDARD, URL_SAFE_NO_PAD};
 use hmac::{Hmac, KeyInit, Mac};

@@ -1,7 +1,7 @@
 //! A log that cannot be written.
 
+use crate::notified::failing;
 use crate::site::{PROGRAM, Program, Site, eventually};
-use crate::telling::failing;
 use std::fs::{self, OpenOptions};
 use std::process::{Command, Stdio};
 

@@ -46,7 +46,7 @@ fn failing() -> String {
 /// 13. EMFILE: neither a file can be opened nor a hook be started.
 #[test]
 #[cfg_attr(not(has_prlimit), ignore = "prlimit was not found by build.rs")]
-fn a_daemon_without_file_descriptors_loses_nothing_and_tells_its_alerts_once_it_has_some() {
+fn a_daemon_without_file_descriptors_loses_nothing_and_sends_its_alerts_once_it_has_some() {
     let site = Site::new(POLICY);
     site.append("incoming/5.csv", HEADER);
     let mut program = site.caught_up();

@@ -26,7 +26,7 @@
 //! | 24 | the host's clock, one wrong time stamp, a clock that was never set | `time`; src/runtime/site/timekeeper.rs |
 //! | 25 | sensors that are stuck, spoilt, or give another quantity | `sensors`; src/monitor/suspect.rs |
 //! | 26 | files, messages and brokers that give nothing | `feeds`; tests/daemon/mqtt.rs |
-//! | 27 | backlogs, corrections, silences, slow hooks, hooks of the site | `telling`, `reach`; tests/daemon/hooks.rs |
+//! | 27 | backlogs, corrections, silences, slow hooks, hooks of the site | `notified`, `reach`; tests/daemon/hooks.rs |
 //! | 28 | what an operator is to see: what never read, restarts, a state that is gone, forged names | `view` |
 //! | 29 | much of it at once, for ten thousand hours | tests/hostile_hours |
 //! | 30 | a first start on history; a row and its correction, read again | `past`; tests/library/first_start.rs |
@@ -42,7 +42,7 @@
 //!
 //! A test for which the machine lacks something (strace, mounts of one's own, libfaketime) is ignored, as `build.rs` finds
 //! it. Not covered: a loss of power (a killed process leaves what the kernel has; whether a disk keeps what it said
-//! was synced only pulling its plug tells), and a server whose files are gone (ESTALE is an answer that strace gives).
+//! was synced only pulling its plug shows), and a server whose files are gone (ESTALE is an answer that strace gives).
 
 #![allow(
     clippy::unwrap_used,
@@ -71,6 +71,7 @@ mod log;
 mod machine;
 mod many_alerts;
 mod model;
+mod notified;
 mod orders;
 mod past;
 mod reach;
@@ -80,7 +81,6 @@ mod reread;
 mod seen;
 mod sensors;
 mod site;
-mod telling;
 mod time;
 mod upgrade;
 mod view;

@@ -55,7 +55,7 @@ fn all_at_once(files: usize) {
             .filter(|line| line.starts_with("flood/"))
             .count()
     };
-    eventually("the message that tells of many", || together() > 0);
+    eventually("the message that reports many", || together() > 0);
     let events = site.events();
     let reds = events
         .matches("\"level\":\"red\",\"state\":\"firing\"")

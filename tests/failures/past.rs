@@ -1,7 +1,7 @@
 //! A first start on history, and rows that are read again.
 
+use crate::notified::failing;
 use crate::site::{Site, eventually};
-use crate::telling::failing;
 use jiff::SignedDuration;
 use slipwatch::runtime::clock;
 use std::collections::BTreeMap;

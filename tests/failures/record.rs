@@ -1,7 +1,7 @@
 //! The record of one alert: shown in words, as JSON and over HTTP, and a bundle that reproduces the decision by itself.
 
+use crate::notified::failing;
 use crate::site::{PROGRAM, Site, eventually, get};
-use crate::telling::failing;
 use serde_json::Value;
 use std::fs::{self, File};
 use std::path::Path;
@@ -29,7 +29,7 @@ fn show(site: &Site, more: &[&str]) -> String {
 }
 
 #[test]
-fn an_alert_says_what_called_it_who_has_it_and_who_has_seen_it_why_and_over_which_door() {
+fn an_alert_says_what_called_it_who_has_it_and_who_has_seen_it_why_and_by_which_way() {
     let (site, program, address) = red();
     site.printed(&[
         "alerts",

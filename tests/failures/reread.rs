@@ -1,7 +1,7 @@
 //! What a reload changes of the meaning of readings, and which benchmarks it takes from files that have been read already.
 
+use crate::notified::failing;
 use crate::site::{Program, Site, eventually};
-use crate::telling::failing;
 use jiff::SignedDuration;
 use nix::sys::signal::Signal;
 use slipwatch::runtime::clock;
@@ -500,7 +500,7 @@ fn codes_that_the_config_names_later_are_no_readings_any_more() {
 }
 
 #[test]
-fn a_hook_that_asks_for_less_than_before_receives_the_end_of_what_it_was_told() {
+fn a_hook_that_asks_for_less_than_before_receives_the_end_of_what_it_was_notified_of() {
     let second = |keys: &str| {
         format!(
             "{}{POLICY}[[hook]]\nrun = [\"/bin/sh\", \"second.sh\"]\n{keys}\n",

@@ -1,7 +1,7 @@
 //! Sensors that fail without falling silent.
 
+use crate::notified::failing;
 use crate::site::{Program, Site, eventually, get};
-use crate::telling::failing;
 use jiff::SignedDuration;
 use slipwatch::runtime::clock;
 use std::time::Duration;
@@ -37,13 +37,12 @@ fn at_red(more: &str) -> (Site, Program) {
     (site, program)
 }
 
-#[test]
-fn a_sensor_that_repeats_its_value_after_a_red_is_unknown_and_the_red_stays() {
+/// After a red the sensor gives `value` at so many hours before now.
+fn is_unknown_and_stays_red(value: impl Fn(i64) -> f64) {
     let (site, program) = at_red("");
-    let last = 200.0 * (120.0_f64 / 7.0).ln();
     for hour in (0..30).rev() {
         let time = clock::now() - SignedDuration::from_hours(hour);
-        site.append("incoming/5.csv", &format!("{time},{last:.4}\n"));
+        site.append("incoming/5.csv", &format!("{time},{:.4}\n", value(hour)));
     }
     eventually("unknown", || site.events().contains("stuck-sensor"));
     eventually("everything", || site.values().len() == 144);
@@ -53,21 +52,19 @@ fn a_sensor_that_repeats_its_value_after_a_red_is_unknown_and_the_red_stays() {
     assert!(site.notified("5/unknown/", "firing") >= 1, "{events}");
 }
 
+/// The last one before.
+fn last_value() -> f64 {
+    200.0 * (120.0_f64 / 7.0).ln()
+}
+
+#[test]
+fn a_sensor_that_repeats_its_value_after_a_red_is_unknown_and_the_red_stays() {
+    is_unknown_and_stays_red(|_| last_value());
+}
+
 #[test]
 fn a_sensor_that_jitters_at_the_end_of_its_range_after_a_red_is_unknown_and_the_red_stays() {
-    let (site, program) = at_red("");
-    let end = 200.0 * (120.0_f64 / 7.0).ln() + 10.0;
-    for hour in (0..30).rev() {
-        let time = clock::now() - SignedDuration::from_hours(hour);
-        let jitter = 0.01 * f64::from((i32::try_from(hour).unwrap() * 7) % 5);
-        site.append("incoming/5.csv", &format!("{time},{:.4}\n", end + jitter));
-    }
-    eventually("unknown", || site.events().contains("stuck-sensor"));
-    eventually("everything", || site.values().len() == 144);
-    program.stop();
-    let events = site.proven_events();
-    assert_eq!(site.notified("5/red/", "resolved"), 0, "{events}");
-    assert!(site.notified("5/unknown/", "firing") >= 1, "{events}");
+    is_unknown_and_stays_red(|hour| last_value() + 10.0 + 0.01 * ((hour * 7) % 5) as f64);
 }
 
 fn spoils(change: impl Fn(usize, f64) -> f64) {

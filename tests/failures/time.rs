@@ -1,9 +1,9 @@
 //! Clocks that are wrong: the host's, and those of loggers.
 
 use crate::machine::{another_clock, by_another_clock};
+use crate::notified::failing;
 use crate::reach::{alerts, taken};
 use crate::site::{PROGRAM, Site, eventually, get};
-use crate::telling::failing;
 use jiff::{SignedDuration, Timestamp};
 use nix::sys::signal::Signal;
 use slipwatch::runtime::clock;
@@ -299,7 +299,7 @@ fn a_silence_lasts_as_long_as_it_was_given_for_where_the_hosts_clock_is_days_ahe
 
 /// As by a logger whose clock jumps once, or that stands in the hour after the end of summer time.
 #[test]
-fn one_reading_stamped_within_the_hour_keeps_no_honest_one_from_calling_red() {
+fn one_reading_stamped_within_the_hour_keeps_no_true_one_from_calling_red() {
     let site = Site::new("[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"50 mm\"\n");
     let creep: String = (1..60)
         .rev()

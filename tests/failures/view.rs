@@ -1,7 +1,7 @@
 //! What an operator sees.
 
+use crate::notified::failing;
 use crate::site::{Site, eventually, get};
-use crate::telling::failing;
 use jiff::SignedDuration;
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use slipwatch::runtime::clock;

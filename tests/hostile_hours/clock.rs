@@ -1,4 +1,4 @@
-//! The true time, which tokio's clock tells, and the host's, which may be wrong.
+//! The true time, which tokio's clock has, and the host's, which may be wrong.
 
 use jiff::{SignedDuration, Timestamp};
 use std::cell::Cell;

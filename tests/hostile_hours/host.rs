@@ -186,7 +186,7 @@ impl<'a> Host<'a> {
     }
 
     /// Whether the hook takes alerts of this benchmark.
-    pub(crate) fn tells(&self, name: &str) -> bool {
+    pub(crate) fn notifies(&self, name: &str) -> bool {
         match &self.hook.0.lock().unwrap().mood {
             Mood::Works | Mood::LosesRed => true,
             Mood::HangsAt(other) => *other != name,

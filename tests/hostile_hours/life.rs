@@ -382,7 +382,7 @@ impl Life<'_> {
             return true;
         }
         due.was_unknown |= knows_unknown;
-        if !self.host.is_up() || !self.host.tells(due.name) || knows_unknown {
+        if !self.host.is_up() || !self.host.notifies(due.name) || knows_unknown {
             due.unnotified_since = None;
             return false;
         }

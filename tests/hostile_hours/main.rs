@@ -61,7 +61,7 @@ const HOURS: u64 = 250;
 const FOUND: [(u64, &str); 2] = [
     (
         1,
-        "a clock that is set back after days of readings in time: honest readings were set aside for good",
+        "a clock that is set back after days of readings in time: true readings were set aside for good",
     ),
     (
         37,

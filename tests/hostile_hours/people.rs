@@ -45,7 +45,7 @@ impl People {
             .is_some_and(|keys| !keys.is_empty())
     }
 
-    fn hear(&mut self, alert: &Alert) {
+    fn receive(&mut self, alert: &Alert) {
         self.notified += 1;
         let benchmark = alert.event.benchmark.as_ref().map(ToString::to_string);
         let keys = self.in_force.entry((benchmark, alert.level)).or_default();
@@ -87,7 +87,7 @@ impl Runner for Hook {
             let mood = people.lock().unwrap().does(&alert);
             match mood {
                 Mood::Works => {
-                    people.lock().unwrap().hear(&alert);
+                    people.lock().unwrap().receive(&alert);
                     HookOutcome::Done
                 }
                 Mood::LosesRed => HookOutcome::Done,

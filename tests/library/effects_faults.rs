@@ -59,7 +59,7 @@ fn salmon_falls_loggers_were_reset_on_the_three_known_days_and_each_benchmark_ha
 
 #[test]
 #[cfg_attr(not(measured_data), ignore = "no measured data here")]
-fn corrected_salmon_falls_loggers_tell_what_their_owners_corrected_values_tell() {
+fn corrected_salmon_falls_loggers_show_what_their_owners_corrected_values_show() {
     let file = measured("salmon_falls_2017.csv");
     let recording = read(file);
     let channels = inspect(&recording.series[0], &recording.channels).channels;

@@ -341,7 +341,7 @@ fn houstons_height_steps_are_never_orange_or_red() {
         let event: serde_json::Value = serde_json::from_str(line).unwrap();
         if event["event"] == "alert" {
             alerts += 1;
-            // The gaps of the record are told. Of motion nothing should be said, and yet it asks once or twice for a
+            // The gaps of the record are reported. Of motion nothing should be said, and yet it asks once or twice for a
             // look, at a chance of .13 within 30 days after a step in 2019: yellow from .1.
             let level = event["level"].as_str().unwrap();
             assert!(["unknown", "yellow"].contains(&level), "{line}");

@@ -134,7 +134,7 @@ async fn said_by_a_daemon() -> Vec<String> {
             break;
         }
     }
-    trigger.pull();
+    trigger.request();
     task.await.unwrap().unwrap();
     let last = measured.readings.last().unwrap().time;
     let events = events_of(&config.site.state_dir).into_iter();
@@ -240,7 +240,7 @@ async fn a_daemon_finds_what_a_replay_finds_though_its_search_holds_nothing_up()
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_search_that_is_switched_off_finds_nothing_and_one_that_only_tells_adopts_nothing() {
+async fn a_search_that_is_switched_off_finds_nothing_and_one_that_only_reports_adopts_nothing() {
     assert_eq!(found(&said(Explain::Off, ReplayPace::Max, None).await), []);
     let told = said(Explain::Report, ReplayPace::Max, None).await;
     let found = found(&told);

@@ -70,7 +70,7 @@ fn every_reference_row_is_met_as_a_function_of_time() {
     for row in &rows {
         let at = format!("m={} x_i={} t={}", row.m, row.x_i, row.t);
         if tolerance(row.condition_velocity) > 0.5 {
-            continue; // t itself cannot tell this row from the singularity
+            continue; // t itself does not distinguish this row from the singularity
         }
         let (law, trajectory) = solve(row);
         let motion = trajectory

@@ -72,7 +72,7 @@ fn apart(report: &TogetherReport) -> Vec<&str> {
 }
 
 #[test]
-fn four_benchmarks_of_one_mass_foretell_its_end_more_narrowly_than_any_alone() {
+fn four_benchmarks_of_one_mass_forecast_its_end_more_narrowly_than_any_alone() {
     let benchmarks = vaiont();
     let collapse: Timestamp = "1963-10-09T21:39:00Z".parse().unwrap();
     let end = benchmarks[0].readings.last().unwrap().time;

@@ -5,12 +5,13 @@
     reason = "what a claim rests on is shown when it fails"
 )]
 
+use crate::crisis::recording;
 use crate::measured::measured;
 use slipwatch::fit::{Observation, Observations};
 use slipwatch::forecast::{HORIZON_DAYS, LawForecaster, Outlook};
 use slipwatch::reading::{Quantity, Series, Timestamp, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use studies::{Fate, Life};
 
 /// 1 m/day.
@@ -25,12 +26,6 @@ fn series(file: &Path, averaging: Option<jiff::SignedDuration>) -> Vec<Series> {
         .unwrap()
         .0
         .series
-}
-
-fn recording(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("recordings")
-        .join(name)
 }
 
 fn observations(series: &Series) -> Observations {
@@ -194,7 +189,7 @@ fn simulated_failures_are_predicted_without_bias_and_within_their_intervals() {
 }
 
 #[test]
-fn a_compacted_record_foretells_what_the_whole_one_does() {
+fn a_compacted_record_forecasts_what_the_whole_one_does() {
     let long = (0..400)
         .map(|seed| Life::draw(Fate::Failing, 30_000 + seed))
         .filter(|life| life.readings.len() > 2500)

@@ -105,7 +105,7 @@ async fn a_red_that_comes_with_the_backlog_of_a_logger_that_was_silent_is_report
     let red = called(&folder, Level::Red);
     let time = &red[0];
     assert!(*time < now - hours(6), "{time} is not long past at {now}");
-    // A restart tells nobody twice.
+    // After a restart nobody is notified twice.
     let mut daemon = Daemon::start(&config);
     daemon
         .until("the past", |progress| progress.is_caught_up)
