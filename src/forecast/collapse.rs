@@ -8,6 +8,7 @@
 //! they are asked at every reading; of the rest a small part is left, so that nothing is called impossible.
 
 use super::evidence::{self, Evidence};
+use super::held_step;
 use super::learned::LEARNED;
 use super::members::{LARGEST_INPUT, LONGEST_DAYS, Members};
 use super::network::{INPUTS, Network};
@@ -59,6 +60,8 @@ const ONE_SCALE: f64 = 3.0;
 /// chosen on these, with the measured series in view.
 const SPREAD: f64 = 0.85;
 const SOONER: f64 = 1.2;
+/// A chance under this calls nothing, and is not asked whether a step of the velocity makes it.
+const WITH_STEP: f64 = 0.02;
 /// The share of the chance by the readings since an event that counts for levels: most events are followed by others of their
 /// kind. Set on simulated slopes: the whole of it calls a tenth more reds on those that stand.
 const LATER: f64 = 0.6;
@@ -206,7 +209,8 @@ impl Indicators {
             let chance = network.chance(&self.inputs(members, power, days)) * (1.0 - creeps);
             reached += share * (chance - reached).max(0.0);
             let goes_on = goes_on(&self.scales, power, accelerating);
-            sure += share * (self.most(days) * chance * goes_on - sure).max(0.0);
+            let shown = self.with_step(power, days, self.most(days) * chance * goes_on);
+            sure += share * (shown - sure).max(0.0);
             all.push((span.counts_within(), reached));
             counted.push((span.counts_within(), sure));
         }
@@ -215,6 +219,20 @@ impl Indicators {
         }
         let centred = self.scales.centred_before_days;
         (all, passage(&counted, &members.law, centred))
+    }
+
+    /// `chance` within the span of scale `power`, less as far as the motion looks like a step of the velocity that holds.
+    fn with_step(&self, power: usize, days: f64, chance: f64) -> f64 {
+        if chance < WITH_STEP {
+            return chance;
+        }
+        let courses = &self.scales.courses;
+        let shorter = power.saturating_sub(held_step::DOUBLINGS);
+        let Some(course) = courses.get(shorter).or(courses.last()) else {
+            return chance;
+        };
+        let factor = held_step::ln_factor(course, days).exp();
+        factor * chance / (1.0 - chance + factor * chance)
     }
 
     /// `passage` with the odds of each chance within a time by [`SPREAD`] and [`SOONER`], as far as it is likely that the slope
@@ -257,7 +275,7 @@ impl Indicators {
 fn as_fast_as(event: &PastEvent, scales: &Scales) -> f64 {
     let each = scales.each.iter();
     let shorter = each.take_while(|scale| scale.days <= event.block_days.max(scales.base_days));
-    let now = shorter.map(|scale| scale.velocity - error(scale));
+    let now = shorter.map(|scale| scale.velocity - scale.error);
     let fastest = now.fold(0.0, f64::max);
     (fastest / event.velocity.max(f64::MIN_POSITIVE))
         .min(1.0)
@@ -281,7 +299,7 @@ fn newest(observations: &Observations, days: f64) -> Option<Observations> {
 fn goes_on(scales: &Scales, power: usize, accelerating: f64) -> f64 {
     let view = View::at(scales, power);
     let scale = view.scale(0);
-    let highest = ln_above(scale.highest_velocity, error(scale));
+    let highest = ln_above(scale.highest_velocity, scale.error);
     let since = view.ln_velocity(-view.span) - view.ln_velocity(0);
     let ever = view.ln_velocity(0) - highest;
     let has_slowed = (since.exp() / SLOWED).min(1.0) * ever.exp().min(1.0).powi(SURVIVED);
@@ -323,7 +341,7 @@ fn growth(scales: &Scales, power: usize, span: f64) -> impl Iterator<Item = f64>
     let last = (power + 1).min(scales.each.len());
     let each = scales.each.get(shorter..last).unwrap_or_default().iter();
     each.map(move |scale| {
-        let moved = ln_above(scale.velocity, error(scale)).exp() * scale.days;
+        let moved = ln_above(scale.velocity, scale.error).exp() * scale.days;
         let expected = moved * scale.days / (span + 2.0 * scale.days);
         let deviation = scale.near.usual.hypot(UNEVEN * expected);
         expected * (scale.near.newest - 0.5 * expected) / (deviation * deviation)
@@ -355,13 +373,8 @@ impl<'a> View<'a> {
     /// ln of the newest velocity there, mm/day.
     fn ln_velocity(&self, longer: i64) -> f64 {
         let scale = self.scale(longer);
-        ln_above(scale.velocity, error(scale))
+        ln_above(scale.velocity, scale.error)
     }
-}
-
-/// The usual error of a velocity, mm/day.
-fn error(scale: &Scale) -> f64 {
-    scale.near.usual / scale.days
 }
 
 /// ln of a value that may be under its error: half of v + sqrt(v^2 + 4 s^2).
@@ -387,7 +400,7 @@ fn motion(view: &View<'_>, inputs: &mut Vec<f64>) {
     }
     for longer in [-4, -2, 0, 2] {
         let scale = view.scale(longer);
-        inputs.push(bounded(0.3 * (scale.velocity / error(scale)).asinh()));
+        inputs.push(bounded(0.3 * (scale.velocity / scale.error).asinh()));
     }
 }
 
@@ -396,7 +409,7 @@ fn novelty(view: &View<'_>, inputs: &mut Vec<f64>) {
     let bounded = |value: f64| value.clamp(-LARGEST_INPUT, LARGEST_INPUT);
     for longer in [-4, -2, -1, 0, 2] {
         let scale = view.scale(longer);
-        let before = ln_above(scale.highest_velocity, error(scale));
+        let before = ln_above(scale.highest_velocity, scale.error);
         inputs.push(bounded(view.ln_velocity(longer) - before));
     }
     for longer in [-4, -2, 0, 1] {
@@ -406,7 +419,7 @@ fn novelty(view: &View<'_>, inputs: &mut Vec<f64>) {
     }
     for longer in [-2, 0] {
         let scale = view.scale(longer);
-        let median = ln_above(scale.median_velocity, error(scale));
+        let median = ln_above(scale.median_velocity, scale.error);
         inputs.push(bounded(0.5 * (view.ln_velocity(longer) - median)));
     }
 }

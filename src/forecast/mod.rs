@@ -5,6 +5,7 @@ mod dependence;
 mod evidence;
 mod excursions;
 mod free_exponent;
+mod held_step;
 mod intervals;
 mod isolated_step;
 mod law_passages;

@@ -4,6 +4,7 @@
 //! A forecast rests on the newest velocity and the newest change of each scale, and on how large such changes were
 //! before: a change that is usual for the instrument or for the slope is no evidence of anything.
 
+use super::held_step::{self, BlockDisplacements};
 use super::intervals::Intervals;
 use super::past_event::{LEAST_CHANGE_MM, PastEvent, median, past_events};
 use super::sessions::merged;
@@ -60,6 +61,8 @@ pub struct Scale {
     pub far: VelocityChange,
     /// Largest step between two readings over the motion of the two newest blocks.
     pub jump: f64,
+    /// Standard error of a velocity as blocks are mostly read, mm/day: the newest ones may hold fewer readings.
+    pub error: f64,
 }
 
 /// The scales of a record, shortest first.
@@ -77,6 +80,8 @@ pub struct Scales {
     pub centred_before_days: f64,
     /// At least one.
     pub each: Vec<Scale>,
+    /// The displacements that each is of.
+    pub(super) courses: Vec<BlockDisplacements>,
     /// The newest of one or two events that stand out of all else in the record.
     pub disturbed: Option<PastEvent>,
 }
@@ -130,7 +135,8 @@ impl Scales {
         let interval_days = intervals.now;
         let base_days = interval_days.max(FINEST_BLOCK_DAYS);
         let noise = ReadingNoise::of(observations, values, interval_days);
-        let mut each: Vec<Scale> = Vec::new();
+        let (mut each, mut courses): (Vec<Scale>, Vec<BlockDisplacements>) =
+            (Vec::new(), Vec::new());
         let mut blocks = Blocks::default();
         let (mut events_found, mut usual) = (Vec::new(), 0.0_f64);
         for power in 0..MOST_SCALES {
@@ -139,6 +145,7 @@ impl Scales {
                 break;
             };
             each.push(scale);
+            courses.push(blocks.course(power, interval_days < 0.5 * base_days));
             if !events {
                 continue;
             }
@@ -159,6 +166,7 @@ impl Scales {
             length_days: -curve.days[0],
             centred_before_days: 0.5 * observations.averaging_days,
             each,
+            courses,
             disturbed: PastEvent::newest(&events_found, usual),
         })
     }
@@ -370,6 +378,22 @@ fn integrated(averaging_days: f64, values: &[Observation]) -> Vec<f64> {
 }
 
 impl Blocks {
+    /// The newest of them; where readings are sparse (not `is_dense`) those of the two shortest scales are points.
+    fn course(&self, power: usize, is_dense: bool) -> BlockDisplacements {
+        let count = self.means.len().min(held_step::MOST_BLOCKS);
+        let newest_days = match power {
+            0 if !is_dense => 0.0,
+            1 if !is_dense => 0.25 * self.days,
+            _ => 0.5 * self.days,
+        };
+        BlockDisplacements {
+            days: self.days,
+            newest_days,
+            displacements: self.means[..count].to_vec(),
+            is_read: self.is_read[..count].to_vec(),
+        }
+    }
+
     /// What the blocks show; `None` where there are fewer than three. `shorter` is the scale below.
     fn scale(&self, shorter: Option<&Scale>, noise: ReadingNoise, curve: &Curve) -> Option<Scale> {
         let means = &self.means;
@@ -398,6 +422,7 @@ impl Blocks {
             near,
             far,
             jump: curve.jump(self.days, near.usual),
+            error: near.usual / self.days,
         })
     }
 

@@ -170,12 +170,14 @@ fn steady_motion_read_more_seldom_from_now_on_is_not_called() {
             readings(24 * 20, 1.0 / 24.0, creep),
             readings(60, 1.0, creep),
         );
-        for day in 21..50 {
+        // Three daily readings, and ever more of them.
+        for day in 22..50 {
             let mut changed = then(&hourly, &daily, 20.0);
             changed
                 .values
                 .retain(|one| one.t_days < f64::from(day) + 0.5);
             let chance = collapse(&changed).sure.chance_within(3.0);
+            // What calls red, unless the config has it otherwise.
             // What calls red, unless the config has it otherwise.
             assert!(chance < 0.27, "{step}, day {day}: {chance}");
         }
