@@ -65,6 +65,7 @@ pub fn check(file: &Path) -> Result<ConfigSummary, ConfigError> {
             .chain(config.site.token_file.as_deref().and_then(open_token))
             .chain(slow_sampling(&config))
             .chain(levels_without_hook(&config))
+            .chain(benchmarks_without_hook(&config))
             .chain(unknown_benchmarks(&config))
             .chain(only_escalated(&config))
             .chain(off_duty(&config))
@@ -242,6 +243,38 @@ fn levels_without_hook(config: &Config) -> Vec<String> {
         }
     }
     lines
+}
+
+/// Benchmarks whose own red reaches nobody: hooks ask for other benchmarks, or for the site's level alone.
+fn benchmarks_without_hook(config: &Config) -> Option<String> {
+    const MOST_NAMED: usize = 5;
+    let asks = |hook: &&HookConfig| hook.levels.contains(&Level::Red);
+    let mut of_one = config.hooks.iter().filter(asks).filter(|hook| !hook.site);
+    if of_one.clone().any(|hook| hook.benchmarks.is_empty()) {
+        return None;
+    }
+    if of_one.clone().next().is_none() {
+        let of_site = config.hooks.iter().find(asks)?;
+        return Some(format!(
+            "{:?} is notified of the site's red, and no hook of the red of a benchmark: where the site is red already, nobody is notified of another one",
+            of_site.name()
+        ));
+    }
+    let named = config.benchmarks.iter().map(|benchmark| &benchmark.id);
+    let mut missed = named.filter(|id| !of_one.any(|hook| hook.benchmarks.contains(*id)));
+    let first: Vec<String> = (missed.by_ref().take(MOST_NAMED))
+        .map(ToString::to_string)
+        .collect();
+    let more = match missed.count() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (!first.is_empty()).then(|| {
+        format!(
+            "no hook that has red among its levels asks for {}{more}: nobody is notified of their red",
+            first.join(", ")
+        )
+    })
 }
 
 /// Levels of which the first notification comes only when nobody has acknowledged what nobody was notified of.

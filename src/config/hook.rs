@@ -48,6 +48,18 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
 
 /// The outbox knows a hook by its command line: one that is run at once and again later needs two.
 fn unlike(root: &Section<'_>, hooks: &[HookConfig]) {
+    for (place, hook) in hooks.iter().enumerate() {
+        let name = hook.name();
+        let is_other = |one: &HookConfig| one.name() == name && one.run != hook.run;
+        if hooks[..place].iter().any(is_other) {
+            root.error(
+                root.at(),
+                format!("two hooks that are not the same are named {name:?}: what one of them was notified of would count for the other"),
+                "give one of them an argument of its own, as in run = [\"./notify.sh\", \"second\"]",
+            );
+            return;
+        }
+    }
     let later = hooks.iter().filter(|hook| hook.waits_on_purpose());
     for hook in later.filter(|hook| !hook.run.is_empty()) {
         if hooks.iter().filter(|one| one.run == hook.run).count() > 1 {

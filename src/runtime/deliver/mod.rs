@@ -248,6 +248,11 @@ impl Dispatcher {
             .collect()
     }
 
+    /// Whether the config has a hook of this name.
+    pub(super) fn has_hook(&self, name: &str) -> bool {
+        self.hooks.iter().any(|way| way.hook.name() == name)
+    }
+
     /// Makes the receipts durable that are not yet, as those that found no room on the disk before.
     pub fn commit(&self) {
         locked(&self.delivered).commit_or_log();

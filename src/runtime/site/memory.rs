@@ -309,7 +309,11 @@ impl Site {
         for alert in waiting {
             let asking = dispatcher.asking(alert);
             let awaited = store.awaited(alert.identity())?;
-            let gone = awaited.iter().filter(|hook| !asking.contains(hook));
+            // Whoever received the beginning receives the end too, whatever is asked for by now.
+            let is_end = alert.state == MessageState::Resolved;
+            let takes =
+                |hook: &String| asking.contains(hook) || is_end && dispatcher.has_hook(hook);
+            let gone = awaited.iter().filter(|hook| !takes(hook));
             let gone: Vec<&String> = gone.collect();
             for hook in &gone {
                 ended.push(delivery(alert, hook)?);
