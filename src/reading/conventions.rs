@@ -126,7 +126,7 @@ impl TimeFault {
             }
             Self::NotThePattern => "a time as time_format (--time-format) says",
             Self::NotUnix => {
-                "seconds since 1970, as time_format (--time-format) says; unix_ms for milliseconds"
+                "seconds since 1970 (unix) or milliseconds (unix_ms), as time_format (--time-format) says; what counts otherwise, such as in microseconds, must be converted"
             }
             Self::SecondsNotMilliseconds => {
                 "milliseconds since 1970, as time_format (--time-format) says; unix for seconds"

@@ -134,6 +134,12 @@ fn left_behind(preview: &Preview) -> Vec<String> {
         let of_source = newest.entry(&one.source).or_insert(one.last.0);
         *of_source = one.last.0.max(*of_source);
     }
+    // A column whose header has another name from some file on goes on as a covariate.
+    for one in &preview.covariates {
+        if let Some(of_source) = newest.get_mut(one.source.as_str()) {
+            *of_source = one.last.max(*of_source);
+        }
+    }
     let left = preview.benchmarks.iter().filter_map(|one| {
         let behind = newest
             .get(one.source.as_str())?

@@ -288,3 +288,242 @@ fn a_header_without_rows_is_refused_and_messages_may_change_their_unit() {
     let said = office.done(&["init", "m.ndjson"]);
     contains_all(&said, &["40 readings", "19.5 mm"]);
 }
+
+/// Rows `time,value` with the value as `cell` writes it, below a header of `names`.
+fn table(names: &str, cell: impl Fn(jiff::civil::DateTime, f64) -> String) -> String {
+    format!(
+        "{names}\n{}",
+        rows(60, |time, value| format!("{}\n", cell(time, value)))
+    )
+}
+
+#[test]
+fn points_that_may_part_thousands_are_asked_about_and_never_taken_for_decimals() {
+    let text = table("Zeit;P1_displacement_um", |time, value| {
+        format!(
+            "{};{:.3}",
+            time.strftime("%d.%m.%Y %H:%M"),
+            2.064 + value / 1000.0
+        )
+    });
+    let office = Office::with(&[("a.csv", &text)]);
+    let args = ["init", "a.csv", "--time-zone", "Europe/Zurich"];
+    let said = office.refused(2, &args);
+    contains_all(
+        &said,
+        &["\"2.064\"", "--decimal point or --thousands point"],
+    );
+    let stated = [&args[..], &["--thousands", "point"]].concat();
+    contains_all(&office.done(&stated), &["2064 um"]);
+    let stated = [&args[..], &["--decimal", "point", "--force"]].concat();
+    contains_all(&office.done(&stated), &["2.064 um"]);
+}
+
+#[test]
+fn a_column_of_zones_is_read_or_asked_about() {
+    let zone = |zone: &str| {
+        let zone = zone.to_owned();
+        table("TIMESTAMP,TZ,P1_displacement_mm", move |time, value| {
+            format!("{},{zone},{value}", time.strftime("%F %T"))
+        })
+    };
+    let first = "first 2017-06-01T00:00:00Z";
+    let office = Office::with(&[("a.csv", &zone("UTC"))]);
+    let utc = office.done(&["init", "a.csv"]);
+    let (_, _, said) = office.say(&["init", "a.csv", "--time-zone", "Europe/Rome", "--force"]);
+    contains_all(
+        &said,
+        &["column \"TZ\"", "(UTC)", "60 of 60 rows", "is that right?"],
+    );
+    assert!(utc.contains("in UTC") && utc.contains(first), "{utc}");
+    // An offset is read with each row.
+    let office = Office::with(&[("a.csv", &zone("+02:00"))]);
+    let read = office.done(&["init", "a.csv"]);
+    assert!(read.contains("first 2017-05-31T22:00:00Z"), "{read}");
+    contains_all(
+        &fs::read_to_string(office.path("site.toml")).unwrap(),
+        &["time_column = [\"TIMESTAMP\", \"TZ\"]"],
+    );
+    // Letters are those of a clock that is changed in summer.
+    let office = Office::with(&[("a.csv", &zone("CEST"))]);
+    contains_all(
+        &office.refused(2, &["init", "a.csv"]),
+        &["(CEST)", "--time-zone"],
+    );
+    let (code, _, said) = office.say(&["init", "a.csv", "--time-zone", "Europe/Rome"]);
+    assert!(code == 0 && !said.contains("TZ\" gives"), "{said}");
+}
+
+#[test]
+fn a_line_of_units_below_the_header_is_read_as_such() {
+    let text = table(
+        "Date Time,Ext A,P2_displacement,Temp\nyyyy-mm-dd hh:mm,cm,mm,degC",
+        |time, value| format!("{},{value},{value},12.5", time.strftime("%F %R")),
+    );
+    let office = Office::with(&[("a.csv", &text)]);
+    let args = ["init", "a.csv", "--time-zone", "UTC"];
+    let read = office.done(&args);
+    contains_all(
+        &read,
+        &["P2_displacement_mm  benchmark P2, mm", "covariate Ext A"],
+    );
+    assert!(!read.contains("refused"), "{read}");
+    // The unit that is stated of the other one is compared with the line's.
+    let mapped = ["--force", "--column", "Ext A=P1:displacement:mm"];
+    let said = office.done(&[&args[..], &mapped].concat());
+    contains_all(&said, &["has \"cm\" for it, and it is taken in mm"]);
+    let alone = text.replace("P2_displacement", "Ext B");
+    let said = Office::with(&[("a.csv", &alone)]).refused(2, &args);
+    contains_all(&said, &["Ext A=P1:displacement:cm"]);
+}
+
+#[test]
+fn a_column_in_brackets_goes_on_in_another_unit_and_one_that_ends_is_a_warning() {
+    let day = |day: u32, unit: &str, factor: f64| {
+        let row = |hour: u32| {
+            let value = f64::from(24 * day + hour) / 2.0 * factor;
+            format!("2026-11-{day:02}T{hour:02}:00:00Z,{value:.3}")
+        };
+        let body: Vec<String> = (0..24).map(row).collect();
+        format!("time,Ext1 [{unit}]\n{}\n", body.join("\n"))
+    };
+    let config = site(
+        "d*.csv",
+        "[[benchmark]]\nid = \"P1\"\nsource = \"logger\"\ncolumn = \"Ext1 [mm]\"\nunit = \"mm\"\n",
+    );
+    let with = |other: &str| {
+        let office = Office::with(&[
+            ("d1.csv", &day(1, "mm", 1.0)),
+            ("d2.csv", &day(2, other, 0.1)),
+            ("d6.csv", &day(6, other, 0.1)),
+            ("site.toml", &config),
+        ]);
+        checked(&office)
+    };
+    contains_all(
+        &with("cm"),
+        &[
+            "72 readings of displacement",
+            "found cm, and mm before",
+            "83.5 mm",
+        ],
+    );
+    contains_all(
+        &with("1/10 mm"),
+        &[
+            "its readings end at 2026-11-01T23:00:00Z",
+            "does its column still stand",
+        ],
+    );
+}
+
+#[test]
+fn a_growing_file_whose_unit_in_brackets_changes_is_converted_and_set_up_by_either_name() {
+    let text = rows(40, |time, value| match time.hour() {
+        0 if value > 0.0 => format!("time,Ext1 [cm]\n{time}Z,{}\n", value / 10.0),
+        _ if value > 12.0 => format!("{time}Z,{}\n", value / 10.0),
+        _ => format!("{time}Z,{value}\n"),
+    });
+    let office = Office::with(&[("a.csv", &format!("time,Ext1 [mm]\n{text}"))]);
+    let args = ["init", "a.csv", "--column", "Ext1 [mm]=P1:displacement:mm"];
+    contains_all(
+        &office.done(&args),
+        &[
+            "40 readings of displacement",
+            "19.5 mm",
+            "it was \"Ext1 [mm]\" in mm before",
+        ],
+    );
+}
+
+/// What `init` says of one file of this name and text, which it must refuse.
+fn refused_by_init(file: &str, text: &str, flags: &[&str]) -> String {
+    let office = Office::with(&[(file, text)]);
+    let (code, _, said) = office.say(&[&["init", file][..], flags].concat());
+    assert_ne!(code, 0, "{file}");
+    said
+}
+
+#[test]
+fn what_init_cannot_read_is_called_by_its_name() {
+    for (file, text, parts) in [
+        (
+            "rtk.csv",
+            "GPSWeek,GPSSeconds,E(m)\n2434,172800.0,0.05\n2434,176400.0,0.06\n",
+            ["GPS time", "t_days"],
+        ),
+        (
+            "egms.csv",
+            "pid,20200103,20200109,20200115,20200121,20200127\na,1,2,3,4,5\n",
+            ["dates stand in its header", "one row a point"],
+        ),
+        (
+            "raw.csv",
+            "2026-09-01T00:00:00Z,1.5,2\n2026-09-01T01:00:00Z,1.5,2\n",
+            ["a row and no header", "write one line above"],
+        ),
+        (
+            "raw.dat",
+            "101,2026,244,0,12.6\n101,2026,244,100,12.6\n",
+            ["line 1", "under no header"],
+        ),
+        (
+            "none.csv",
+            "time,Ext,Ext\n2026-09-01T00:00:00Z,1,2\n",
+            ["\"Ext\" stands more than once", "a name of its own"],
+        ),
+        (
+            "twice.csv",
+            "time,P1_displacement_mm,P1_displacement_mm\n2026-09-01T00:00:00Z,1,2\n",
+            ["stands twice", "a name of its own"],
+        ),
+    ] {
+        contains_all(&refused_by_init(file, text, &[]), &parts);
+    }
+    let flags = "--time-zone UTC --time-column Year --time-column DecimalDay --time-format";
+    let flags: Vec<&str> = flags.split(' ').chain(["%Y %j"]).collect();
+    let text = "Year,DecimalDay,Ext1_mm\n2026,244.041,0.1\n2026,244.083,0.1\n";
+    let said = refused_by_init("day.csv", text, &flags);
+    contains_all(&said, &["2026 244.041", "time_format"]);
+}
+
+#[test]
+fn messages_of_several_devices_are_refused_and_times_have_the_column_that_is_named() {
+    let messages = |devices: i8| {
+        rows(40, |time, value| {
+            let (at, device) = (
+                time.to_zoned(jiff::tz::TimeZone::UTC)
+                    .unwrap()
+                    .timestamp()
+                    .as_second(),
+                time.hour() % devices,
+            );
+            format!("{{\"ts\": {at}, \"device\": \"ext{device}\", \"displacement\": {value}}}\n")
+        })
+    };
+    let flags = "--time-column ts --time-format unix --column displacement=P1:displacement:mm";
+    let flags: Vec<&str> = flags.split(' ').collect();
+    let said = refused_by_init("a.ndjson", &messages(2), &flags);
+    contains_all(&said, &["\"device\" looks like the names of points"]);
+    let office = Office::with(&[("a.ndjson", &messages(1))]);
+    let said = office.done(&[&["init", "a.ndjson"][..], &flags].concat());
+    contains_all(
+        &said,
+        &["40 readings of displacement", "first 2017-06-01T00:00:00Z"],
+    );
+}
+
+#[test]
+fn names_of_covariates_that_stand_twice_cost_these_columns_alone() {
+    let text = table("time,P1_displacement_mm,Temp,Temp", |time, value| {
+        format!("{time}Z,{value},1,2")
+    });
+    let office = Office::with(&[("a.csv", &text)]);
+    contains_all(
+        &office.done(&["init", "a.csv"]),
+        &[
+            "60 readings of displacement",
+            "stands more than once in the header",
+        ],
+    );
+}

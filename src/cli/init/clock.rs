@@ -78,10 +78,20 @@ const LETTERS: [(&str, i8); 9] = [
     ("PST", -8),
 ];
 
-fn zone_by_letters(name: &str) -> Option<(&'static str, TimeZone)> {
+fn zone_by_letters(name: &str) -> Option<(&str, TimeZone)> {
     let mut words = name.split(|one: char| !one.is_alphanumeric());
-    let found = words.find_map(|word| LETTERS.iter().find(|(letters, _)| *letters == word))?;
-    Some((found.0, TimeZone::fixed(jiff::tz::offset(found.1))))
+    words.find_map(|word| Some((word, of_letters(word)?)))
+}
+
+/// The zone that these letters stand for, which is never changed: that of CET.
+pub(super) fn of_letters(word: &str) -> Option<TimeZone> {
+    let (_, hours) = LETTERS.iter().find(|(letters, _)| *letters == word)?;
+    of_hours(*hours)
+}
+
+/// The zone of so many hours before UTC.
+pub(super) fn of_hours(hours: i8) -> Option<TimeZone> {
+    value::time_zone(&format!("{hours:+03}:00")).ok()
 }
 
 /// What is said where the name of a column of times has another zone than is stated.

@@ -3,7 +3,7 @@
 use super::times::{self, FoundTimes};
 use super::{clock, marks};
 use crate::cli::args::DialectArgs;
-use crate::reading::{DecimalMark, Dialect};
+use crate::reading::{DecimalMark, Dialect, Unit};
 use crate::runtime::ingest::Survey;
 use jiff::tz::TimeZone;
 
@@ -17,22 +17,25 @@ pub(super) struct Written {
     pub(super) zone: Option<TimeZone>,
     /// Whether they are days since a day 0, in a column `t_days`.
     pub(super) is_in_days: bool,
+    /// What of it is taken in one way, and may be meant in another.
+    pub(super) doubts: Vec<String>,
 }
 
-/// How the table is written, or what the file leaves open; `is_reading`: what a column's name or a flag says.
+/// How the table is written, or what the file leaves open; `unit_of`: what a column's name or a flag says, of columns of readings.
 pub(super) fn written(
     survey: &Survey,
     stated: &DialectArgs,
-    is_reading: &dyn Fn(&str) -> bool,
+    unit_of: &dyn Fn(&str) -> Option<Unit>,
 ) -> Result<Written, Vec<String>> {
-    let decimal = marks::decimal(survey, stated, is_reading);
+    let decimal = marks::decimal(survey, stated, unit_of);
     let decimal_mark = decimal.clone().unwrap_or_default();
     let time = times::find(survey, stated, decimal_mark);
     match (decimal, time) {
         (Ok(decimal), Ok(found)) => {
             let mut written = in_words(survey, decimal, found);
             written.dialect.skip_lines = stated.skip_lines.unwrap_or_default();
-            written.dialect.thousands = marks::thousands(survey, decimal, stated, is_reading);
+            written.dialect.thousands = marks::thousands(survey, decimal, stated, unit_of);
+            written.doubts.extend(marks::doubt(survey, stated, unit_of));
             Ok(written)
         }
         (decimal, time) => {
@@ -63,5 +66,6 @@ fn in_words(survey: &Survey, decimal: DecimalMark, found: FoundTimes) -> Written
         },
         needs_zone: found.needs_zone,
         zone,
+        doubts: Vec::new(),
     }
 }

@@ -1,6 +1,6 @@
 //! What a file holds: benchmarks, covariates alone, or nothing that can be used.
 
-use super::unnamed::{covariates_alone, mostly_refused, without_readings};
+use super::unnamed::{UnusableFile, covariates_alone, mostly_refused, without_readings};
 use super::{Args, PlannedBenchmark, PlannedSource};
 use crate::cli::args::say_remarks;
 use crate::config::SourceKind;
@@ -22,13 +22,12 @@ pub(super) enum FoundInFile {
     Bad(String),
 }
 
-impl FoundInFile {
-    /// Where a flag helps, what is said names it.
-    fn unusable(problem: String) -> Self {
-        if problem.contains("--") {
-            Self::Open(problem)
+impl From<UnusableFile> for FoundInFile {
+    fn from(file: UnusableFile) -> Self {
+        if file.has_a_flag {
+            Self::Open(file.problem)
         } else {
-            Self::Bad(problem)
+            Self::Bad(file.problem)
         }
     }
 }
@@ -49,6 +48,7 @@ pub(super) fn held(
     }
     let looked = look(file, source.kind, &options)?;
     columns.extend(looked.columns.iter().map(|(name, _)| name.clone()));
+    columns.extend(looked.names.iter().cloned());
     let stated = |benchmark: &BenchmarkId, unit: Unit| {
         let mut maps = args.file.columns.iter();
         let map =
@@ -67,14 +67,14 @@ pub(super) fn held(
         });
     let found: Vec<PlannedBenchmark> = found.collect();
     if found.is_empty() {
-        let problem = without_readings(file, &looked, &args.covariates.stated);
+        let unusable = without_readings(file, &looked, &args.covariates.stated);
         return Ok(match covariates_alone(&looked, &args.covariates.stated) {
-            Some(names) => FoundInFile::Covariates(names, problem),
-            None => FoundInFile::unusable(problem),
+            Some(names) => FoundInFile::Covariates(names, unusable.problem),
+            None => unusable.into(),
         });
     }
-    if let Some(problem) = mostly_refused(file, &looked) {
-        return Ok(FoundInFile::unusable(problem));
+    if let Some(unusable) = mostly_refused(file, &looked) {
+        return Ok(unusable.into());
     }
     Ok(FoundInFile::Benchmarks(one_quantity_each(found)))
 }

@@ -2,11 +2,16 @@
 
 use super::times;
 use crate::cli::args::DialectArgs;
-use crate::reading::{DecimalMark, Dialect, ThousandsMark};
+use crate::reading::{DecimalMark, Delimiter, Dialect, LengthUnit, ThousandsMark, Unit};
 use crate::runtime::ingest::Survey;
+use std::collections::BTreeSet;
 
 /// Of the cells of a column with a mark, one in so many may have the other one: a slip of one row decides nothing.
 const ONE_IN: usize = 10;
+
+/// So many different whole numbers below 1000 in a column, beside numbers with a point and three digits behind it, show that the point parts
+/// thousands: a logger that writes three decimals writes them of every number. One may be a mark for no value, such as 999.
+const WHOLE_NUMBERS: usize = 2;
 
 /// Other marks between thousands.
 const OTHERS: &str = "'\u{2019} \u{a0}\u{202f}\u{2009}";
@@ -23,6 +28,8 @@ struct MarkedCells {
     /// Thousands parted by points, as in `1.234,5`, and by commas.
     parted_by_points: Vec<String>,
     parted_by_commas: Vec<String>,
+    /// Whole numbers from 1 to 999, each once.
+    whole: BTreeSet<String>,
 }
 
 /// What the columns of one kind say.
@@ -57,7 +64,15 @@ impl MarkedCells {
                         &mut marked.comma
                     }
                 }
-                (0, 0) => continue,
+                (0, 0) => {
+                    if plain
+                        .parse()
+                        .is_ok_and(|number| (1..1000).contains(&number))
+                    {
+                        marked.whole.insert(cell.clone());
+                    }
+                    continue;
+                }
                 _ if are_parted(cell, DecimalMark::Comma, ThousandsMark::Point) => {
                     &mut marked.parted_by_points
                 }
@@ -146,11 +161,15 @@ struct MarkColumns<'a> {
 }
 
 impl<'a> MarkColumns<'a> {
-    fn of(survey: &'a Survey, stated: &DialectArgs, is_reading: &dyn Fn(&str) -> bool) -> Self {
+    fn of(
+        survey: &'a Survey,
+        stated: &DialectArgs,
+        unit_of: &dyn Fn(&str) -> Option<Unit>,
+    ) -> Self {
         let (mut readings, mut others, mut rest) = (Vec::new(), Vec::new(), Vec::new());
         for (at, (name, cells)) in survey.names.iter().zip(&survey.columns).enumerate() {
             let is_time = stated.time_columns.contains(name) || times::may_be_time(survey, at);
-            if is_reading(name) {
+            if unit_of(name).is_some() {
                 readings.push(cells);
             } else if !is_time && are_numbers(cells) {
                 others.push(cells);
@@ -227,11 +246,11 @@ fn verdict_of(columns: &[&Vec<String>]) -> MarkVerdict {
     }
 }
 
-/// The decimal mark of a table, or which flag decides it; `is_reading`: what a column's name or a flag says.
+/// The decimal mark of a table, or which flag decides it; `unit_of`: what a column's name or a flag says, of columns of readings.
 pub(super) fn decimal(
     survey: &Survey,
     stated: &DialectArgs,
-    is_reading: &dyn Fn(&str) -> bool,
+    unit_of: &dyn Fn(&str) -> Option<Unit>,
 ) -> Result<DecimalMark, String> {
     if let Some(decimal) = stated.decimal {
         return Ok(decimal);
@@ -241,7 +260,7 @@ pub(super) fn decimal(
         Some(ThousandsMark::Point) => return Ok(DecimalMark::Comma),
         Some(ThousandsMark::Blank | ThousandsMark::Apostrophe) | None => {}
     }
-    let columns = MarkColumns::of(survey, stated, is_reading);
+    let columns = MarkColumns::of(survey, stated, unit_of);
     let others = verdict_of(&columns.others);
     match (verdict_of(&columns.readings), others) {
         (MarkVerdict::Sure(mark, _), _) | (MarkVerdict::Nothing, MarkVerdict::Sure(mark, _)) => {
@@ -255,10 +274,12 @@ pub(super) fn decimal(
             MarkVerdict::Open(DecimalMark::Point, point),
             MarkVerdict::Sure(DecimalMark::Comma, comma),
         ) => Err(contradiction(&point, &comma)),
-        (MarkVerdict::Open(DecimalMark::Point, _), _)
-        | (MarkVerdict::Nothing, MarkVerdict::Open(DecimalMark::Point, _)) => {
-            Ok(DecimalMark::Point)
+        (MarkVerdict::Open(DecimalMark::Point, _), others) => {
+            let is_sure = matches!(others, MarkVerdict::Sure(DecimalMark::Point, _));
+            let doubts = PointDoubts::of(survey, is_sure, unit_of);
+            doubts.question().map_or(Ok(DecimalMark::Point), Err)
         }
+        (MarkVerdict::Nothing, MarkVerdict::Open(DecimalMark::Point, _)) => Ok(DecimalMark::Point),
         (MarkVerdict::Open(DecimalMark::Comma, _), MarkVerdict::Sure(DecimalMark::Comma, _)) => {
             Ok(DecimalMark::Comma)
         }
@@ -283,17 +304,116 @@ fn contradiction(point: &str, comma: &str) -> String {
     )
 }
 
+/// Columns of readings in which every point has three digits behind it, and what speaks for points between thousands.
+#[derive(Debug, Default)]
+struct PointDoubts {
+    /// A number with a point, and a whole one of the same column.
+    beside_whole: Option<(String, String)>,
+    /// A number of micrometres, which loggers write without decimals.
+    micrometres: Option<String>,
+    /// A number of millimetres or centimetres.
+    other: Option<String>,
+}
+
+impl PointDoubts {
+    /// `has_decimals`: other columns of the table have a decimal point for sure.
+    fn of(survey: &Survey, has_decimals: bool, unit_of: &dyn Fn(&str) -> Option<Unit>) -> Self {
+        let is_of_commas = survey.delimiter == Delimiter::Comma;
+        let may_part = !has_decimals && (!is_of_commas || has_dates_with_points(survey));
+        let mut doubts = Self::default();
+        for (name, cells) in survey.names.iter().zip(&survey.columns) {
+            let Some(Unit::Length(length) | Unit::Rate(length, _)) = unit_of(name) else {
+                continue;
+            };
+            let marked = MarkedCells::of(cells);
+            let Some(cell) = marked.open_point.first() else {
+                continue;
+            };
+            if marked.whole.len() >= WHOLE_NUMBERS {
+                let whole = marked.whole.first().cloned().unwrap_or_default();
+                doubts.beside_whole.get_or_insert((cell.clone(), whole));
+            }
+            let place = match length {
+                LengthUnit::Micrometre => &mut doubts.micrometres,
+                LengthUnit::Millimetre | LengthUnit::Centimetre => &mut doubts.other,
+                // Three decimals are what such a reading has.
+                LengthUnit::Metre | LengthUnit::Inch | LengthUnit::Foot => continue,
+            };
+            if may_part {
+                place.get_or_insert(cell.clone());
+            }
+        }
+        doubts
+    }
+
+    /// What has to be said with a flag.
+    fn question(&self) -> Option<String> {
+        let (cell, why) = if let Some((cell, whole)) = &self.beside_whole {
+            (cell, format!("whole ones like {whole:?} stand beside them"))
+        } else {
+            let cell = self.micrometres.as_ref()?;
+            (cell, "they are micrometres".to_owned())
+        };
+        Some(format!(
+            "numbers like {cell:?}, all with three digits behind the point, and {why}: the point may stand before decimals or part thousands; \
+             give --decimal point or --thousands point"
+        ))
+    }
+}
+
+/// Whether a column has dates such as 01.09.2026, as they are written where points part thousands.
+fn has_dates_with_points(survey: &Survey) -> bool {
+    let is_date = |cell: &String| {
+        let date = cell.split(' ').next().unwrap_or_default();
+        let parts: Vec<&str> = date.split('.').collect();
+        let are_digits = parts
+            .iter()
+            .all(|part| !part.is_empty() && part.bytes().all(|digit| digit.is_ascii_digit()));
+        parts.len() == 3 && parts[0].len() <= 2 && are_digits
+    };
+    let first = |cells: &Vec<String>| cells.iter().find(|cell| !cell.is_empty()).cloned();
+    let mut firsts = survey.columns.iter().filter_map(first);
+    firsts.any(|cell| is_date(&cell))
+}
+
+/// What is said of a table whose readings were taken with decimal points though nothing in it shows that the points do not part thousands.
+pub(super) fn doubt(
+    survey: &Survey,
+    stated: &DialectArgs,
+    unit_of: &dyn Fn(&str) -> Option<Unit>,
+) -> Option<String> {
+    if stated.decimal.is_some() || stated.thousands.is_some() || !has_dates_with_points(survey) {
+        return None;
+    }
+    let columns = MarkColumns::of(survey, stated, unit_of);
+    let is_open = matches!(
+        verdict_of(&columns.readings),
+        MarkVerdict::Open(DecimalMark::Point, _)
+    );
+    let is_sure = matches!(
+        verdict_of(&columns.others),
+        MarkVerdict::Sure(DecimalMark::Point, _)
+    );
+    let cell = PointDoubts::of(survey, is_sure, unit_of)
+        .other
+        .filter(|_| is_open)?;
+    Some(format!(
+        "numbers like {cell:?}, all with three digits behind the point: the point is taken as the one before decimals; where it parts thousands, give \
+         --thousands point, and where this is right, --decimal point"
+    ))
+}
+
 /// What parts thousands, where a number that nothing else explains shows it.
 pub(super) fn thousands(
     survey: &Survey,
     decimal: DecimalMark,
     stated: &DialectArgs,
-    is_reading: &dyn Fn(&str) -> bool,
+    unit_of: &dyn Fn(&str) -> Option<Unit>,
 ) -> Option<ThousandsMark> {
     if stated.thousands.is_some() {
         return stated.thousands;
     }
-    let columns = MarkColumns::of(survey, stated, is_reading);
+    let columns = MarkColumns::of(survey, stated, unit_of);
     let has_parted = |mark: ThousandsMark| {
         let mut cells = columns.of_numbers().flatten();
         cells.any(|cell| {
@@ -315,7 +435,6 @@ pub(super) fn thousands(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reading::Delimiter;
 
     /// A table of columns by name, each cell written as it stands.
     fn table(columns: &[(&str, Vec<String>)]) -> Survey {
@@ -328,9 +447,15 @@ mod tests {
     }
 
     fn said(survey: &Survey) -> Result<(DecimalMark, Option<ThousandsMark>), String> {
-        let (stated, is_reading) = (DialectArgs::default(), |name: &str| name.starts_with('P'));
-        let decimal = decimal(survey, &stated, &is_reading)?;
-        Ok((decimal, thousands(survey, decimal, &stated, &is_reading)))
+        let stated = DialectArgs::default();
+        let decimal = decimal(survey, &stated, &unit_of)?;
+        Ok((decimal, thousands(survey, decimal, &stated, &unit_of)))
+    }
+
+    /// Of the tests' columns: those of readings begin with a P, and end with their unit.
+    fn unit_of(name: &str) -> Option<Unit> {
+        let unit = Unit::at_end_of(name).unwrap_or(Unit::MM);
+        name.starts_with('P').then_some(unit)
     }
 
     fn column(cell: impl Fn(usize) -> String) -> Vec<String> {
@@ -376,6 +501,53 @@ mod tests {
                 "{refused}"
             );
         }
+    }
+
+    #[test]
+    fn a_point_with_three_digits_behind_it_is_asked_about_where_it_may_part_thousands() {
+        let day = |row: usize| format!("{:02}.09.2026 00:00", 1 + row % 30);
+        let (days, point) = (column(day), Ok((DecimalMark::Point, None)));
+        let three = || column(|row| format!("{}.{:03}", 2 + row % 7, row));
+        let with_days = |name, cells| table(&[("Zeit", days.clone()), (name, cells)]);
+        let asked = said(&with_days("P1_um", three())).unwrap_err();
+        assert!(
+            asked.contains("\"2.000\"") && asked.contains("--thousands point"),
+            "{asked}"
+        );
+        // Three decimals are usual of millimetres, and what they may be besides is said.
+        let millimetres = with_days("P1_mm", three());
+        assert_eq!(said(&millimetres), point);
+        let doubt_of = |survey: &Survey| doubt(survey, &DialectArgs::default(), &unit_of);
+        assert!(doubt_of(&millimetres).is_some_and(|said| said.contains("--thousands point")));
+        let metres = with_days("P1_m", three());
+        assert_eq!((said(&metres), doubt_of(&metres)), (point.clone(), None));
+        // Whole numbers among them have no decimals.
+        let grown = column(|row| match row {
+            0..100 => (900 + row).to_string(),
+            row => format!("1.{row:03}"),
+        });
+        let asked = said(&with_days("P1_mm", grown)).unwrap_err();
+        assert!(asked.contains("\"900\""), "{asked}");
+        // One number elsewhere that can be read in one way alone decides.
+        for (name, cells) in [
+            ("P1_um", with(three(), "0.512")),
+            ("P1_um", with(three(), "12.5")),
+            ("P1_mm", with(three(), "999")),
+        ] {
+            let survey = with_days(name, cells);
+            assert_eq!(said(&survey), point, "{name}");
+        }
+        let battery = column(|_| "12.6".to_owned());
+        let beside = table(&[
+            ("Zeit", days.clone()),
+            ("P1_um", three()),
+            ("Batt", battery),
+        ]);
+        assert_eq!((said(&beside), doubt_of(&beside)), (point.clone(), None));
+        let mut english = with_days("P1_um", three());
+        english.delimiter = Delimiter::Comma;
+        english.columns[0] = column(|_| "2026-09-01 00:00".to_owned());
+        assert_eq!(said(&english), point);
     }
 
     #[test]

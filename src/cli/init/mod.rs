@@ -8,19 +8,22 @@ mod inherited;
 mod long;
 mod marks;
 mod numbers;
+mod problems;
+mod row_zone;
 mod said;
 mod text;
 mod times;
 mod unnamed;
+mod unreadable;
 
 use super::args::{CovariateArgs, DialectArgs, FileArgs, OutputArgs};
 use super::check;
-use super::exit::{self, NoSuchReadings, UsageError};
+use super::exit::{self, UsageError};
 use crate::config::{SourceKind, value};
-use crate::reading::{CovariateKind, Dialect, SummerTime, TimeFormat, Timestamp};
+use crate::reading::{CovariateKind, Dialect, SummerTime, Timestamp};
 use crate::runtime::ingest::{
-    IngestError, Measure, ReadOptions, read_with_remarks, survey, text_format_of, unit_in_name,
-    unpacked_name,
+    IngestError, Measure, ReadOptions, TOA5, look_through, read_with_remarks, survey,
+    survey_objects, text_format_of, unit_in_name, unpacked_name,
 };
 use anyhow::Context;
 use dialect::Written;
@@ -28,6 +31,7 @@ use held::{FoundInFile, held};
 use inherited::inherits_nothing;
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
+use problems::Problems;
 pub(super) use said::ConfigWritten;
 use said::{say_beside, say_next, say_written};
 use std::collections::{BTreeMap, BTreeSet};
@@ -154,29 +158,6 @@ fn usage(problem: String) -> anyhow::Error {
     UsageError(problem).into()
 }
 
-/// What keeps a config from being written.
-#[derive(Debug, Default)]
-struct Problems {
-    /// What a flag decides, and what no flag mends.
-    open: Vec<String>,
-    bad: Vec<String>,
-}
-
-impl Problems {
-    fn leave_open(&mut self, problem: String) {
-        self.open.push(problem);
-    }
-
-    /// As an error, where there are some.
-    fn none(self) -> anyhow::Result<()> {
-        match (&self.open[..], &self.bad[..]) {
-            ([], []) => Ok(()),
-            ([], bad) => Err(NoSuchReadings(bad.join("\n")).into()),
-            (open, bad) => Err(usage([open, bad].concat().join("\n"))),
-        }
-    }
-}
-
 /// What comes from a pipe is there but once, and a daemon would not find it again.
 fn can_be_followed(file: &Path) -> anyhow::Result<()> {
     if file == Path::new("-") || file.exists() && !file.is_file() {
@@ -199,7 +180,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
             Ok(written) => written,
             Err(open) => {
                 for one in open {
-                    problems.leave_open(format!("{}: {one}", file.display()));
+                    problems.leave_open_of(file, one);
                 }
                 continue;
             }
@@ -363,45 +344,37 @@ fn written(
     args: &Args,
 ) -> anyhow::Result<Result<Written, Vec<String>>> {
     let has_zone = args.file.time_zone.is_some();
+    let is_mapped = |name: &str| args.file.columns.iter().any(|map| map.column == name);
     let found = match kind {
-        SourceKind::Csv => {
-            let survey = match survey(file, &args.file.dialect.dialect()) {
-                Err(IngestError::Empty { missing: "row", .. }) => {
-                    return Ok(Err(vec![NO_ROW.to_owned()]));
-                }
-                surveyed => surveyed?,
+        SourceKind::Csv => of_a_table(file, args, &is_mapped)?,
+        SourceKind::Ndjson | SourceKind::Toa5 | SourceKind::Mcap => {
+            if kind == SourceKind::Toa5 {
+                // What is no such table is refused before anything is asked about it.
+                look_through(&TOA5, file, &args.file.options())?;
+            }
+            let dialect = stated_times(kind, &args.file.dialect);
+            let rows = match kind {
+                SourceKind::Ndjson => survey_objects(file)?,
+                SourceKind::Csv | SourceKind::Toa5 | SourceKind::Mcap => None,
             };
-            if let Some(remark) = &survey.encoding {
-                exit::complain(&format_args!("{}: {remark}", file.display()));
-            }
-            for doubt in survey
-                .names
-                .iter()
-                .filter_map(|name| unnamed::not_a_total(name))
-            {
-                exit::complain(&format_args!("{}: {doubt}", file.display()));
-            }
-            let columns = &args.file.columns;
-            let is_mapped = |name: &str| columns.iter().any(|map| map.column == name);
-            let is_reading = |name: &str| is_mapped(name) || unit_in_name(name).is_some();
-            let written = dialect::written(&survey, &args.file.dialect, &is_reading);
-            written.and_then(|written| {
-                match long::names_of_points(&survey, &written.dialect, &is_mapped) {
-                    Some(problem) => Err(vec![problem]),
-                    None => Ok(written),
-                }
-            })
+            let points = rows.and_then(|rows| long::names_of_points(&rows, &dialect, &is_mapped));
+            points.map_or_else(
+                || {
+                    Ok(Written {
+                        dialect,
+                        needs_zone: kind == SourceKind::Toa5,
+                        zone: None,
+                        is_in_days: false,
+                        doubts: Vec::new(),
+                    })
+                },
+                |problem| Err(vec![problem]),
+            )
         }
-        SourceKind::Ndjson | SourceKind::Toa5 | SourceKind::Mcap => Ok(Written {
-            dialect: Dialect {
-                time_format: stated_format(kind, &args.file.dialect),
-                ..Dialect::default()
-            },
-            needs_zone: kind == SourceKind::Toa5,
-            zone: None,
-            is_in_days: false,
-        }),
     };
+    for doubt in found.iter().flat_map(|written| &written.doubts) {
+        exit::complain(&format_args!("{}: {doubt}", file.display()));
+    }
     if let (Ok(written), Some(stated)) = (&found, &args.file.time_zone) {
         let names = written.dialect.time_columns.iter();
         let doubts = names.filter_map(|name| clock::another_zone(name, stated));
@@ -419,12 +392,59 @@ fn written(
     }))
 }
 
-/// How times are written where nothing but the flag says it.
-fn stated_format(kind: SourceKind, stated: &DialectArgs) -> TimeFormat {
-    let stated = stated.time_format.clone();
-    stated
-        .filter(|_| kind == SourceKind::Ndjson)
-        .unwrap_or_default()
+/// The same of a table of text.
+fn of_a_table(
+    file: &Path,
+    args: &Args,
+    is_mapped: &dyn Fn(&str) -> bool,
+) -> anyhow::Result<Result<Written, Vec<String>>> {
+    let survey = match survey(file, &args.file.dialect.dialect()) {
+        Err(IngestError::Empty { missing: "row", .. }) => {
+            return Ok(Err(vec![NO_ROW.to_owned()]));
+        }
+        surveyed => surveyed?,
+    };
+    if let Some(problem) = unreadable::header(&survey) {
+        return Ok(Err(vec![problem]));
+    }
+    if let Some(remark) = &survey.encoding {
+        exit::complain(&format_args!("{}: {remark}", file.display()));
+    }
+    for doubt in survey
+        .names
+        .iter()
+        .filter_map(|name| unnamed::not_a_total(name))
+    {
+        exit::complain(&format_args!("{}: {doubt}", file.display()));
+    }
+    let stated_unit = |name: &str| {
+        let mut maps = args.file.columns.iter();
+        let (Measure::Reading(unit) | Measure::Sigma(unit)) =
+            maps.find(|map| map.column == name)?.measure;
+        Some(unit)
+    };
+    let unit_of = |name: &str| stated_unit(name).or_else(|| unit_in_name(name));
+    let written = dialect::written(&survey, &args.file.dialect, &unit_of);
+    Ok(written.and_then(|mut written| {
+        if let Some(problem) = long::names_of_points(&survey, &written.dialect, is_mapped) {
+            return Err(vec![problem]);
+        }
+        let doubt = row_zone::follow(&survey, &mut written, args.file.time_zone.as_ref());
+        written.doubts.extend(doubt.map_err(|open| vec![open])?);
+        Ok(written)
+    }))
+}
+
+/// How times are written where nothing but the flags say it.
+fn stated_times(kind: SourceKind, stated: &DialectArgs) -> Dialect {
+    if kind != SourceKind::Ndjson {
+        return Dialect::default();
+    }
+    Dialect {
+        time_format: stated.time_format.clone().unwrap_or_default(),
+        time_columns: stated.time_columns.clone(),
+        ..Dialect::default()
+    }
 }
 
 fn source_id(file: &Path, before: &[PlannedSource]) -> String {

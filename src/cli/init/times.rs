@@ -2,6 +2,7 @@
 
 use super::clock;
 use super::numbers::{of_days, of_numbers};
+use super::unreadable;
 use crate::cli::args::DialectArgs;
 use crate::reading::{DecimalMark, Dialect, LocalClock, SummerTime, TimeFormat, Timestamp};
 use crate::runtime::ingest::Survey;
@@ -80,9 +81,10 @@ pub(super) fn find(
     let format = if let Some(format) = &stated.time_format {
         format.clone()
     } else {
-        let names = columns.iter().map(|at| survey.names[*at].as_str());
-        let names = names.collect::<Vec<&str>>().join(" and ");
+        let names: Vec<String> = columns.iter().map(|at| survey.names[*at].clone()).collect();
         let found = format_of(&cells, decimal);
+        let found = found.map_err(|problem| unreadable::times(&names).unwrap_or(problem));
+        let names = names.join(" and ");
         let found = found.and_then(|format| {
             let newest = instants(&cells, &format, decimal).into_iter().max();
             of_days(&names, first_of(&cells), format, newest)
@@ -206,12 +208,7 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
         ([date], [time]) => Ok(TimeColumns::Times(
             [*date, *time].into_iter().chain(half).collect(),
         )),
-        ([], _) => Err(format!(
-            "no column gives a time that is known; the header has {}: give --time-column NAME (once for each column where date and \
-             time stand in several), and --time-format, such as \"%d.%m.%Y %H:%M\", in which a word such as CET stands as it does in the cells, with \
-             --time-zone; where other lines stand before the header, --skip-lines COUNT",
-            with_first_cells(survey)
-        )),
+        ([], _) => Err(no_times(survey)),
         (several, of_day) => {
             let names = several
                 .iter()
@@ -223,6 +220,22 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
             ))
         }
     }
+}
+
+/// What is said of a table without times.
+fn no_times(survey: &Survey) -> String {
+    let columns = with_first_cells(survey);
+    if let Some(counted) = unreadable::times(&survey.names) {
+        return format!(
+            "no column gives a time that is known; the header has {columns}: {counted}"
+        );
+    }
+    format!(
+        "no column gives a time that is known; the header has {columns}: give --time-column NAME (once for each column where date and \
+         time stand in several), and --time-format, such as \"%d.%m.%Y %H:%M\", in which a word such as CET stands as it does in the cells, with \
+         --time-zone; where other lines stand before the header, --skip-lines COUNT; what no format can write, such as weeks of GPS time, days \
+         with a fraction or hours since a start, must be converted to days in a column t_days, with --epoch for day 0"
+    )
 }
 
 /// The names of the columns, each with its first cell that holds something.
@@ -341,7 +354,8 @@ fn format_of(cells: &[String], decimal: DecimalMark) -> Result<TimeFormat, Strin
     match &formats[..] {
         [only] => Ok(only.clone()),
         [] => Err(format!(
-            "times like {:?} are in no form that is known; give --time-format, such as \"%d.%m.%Y %H:%M\"",
+            "times like {:?} are in no form that is known; give --time-format, such as \"%d.%m.%Y %H:%M\"; what no format can write must be converted to days in \
+             a column t_days, with --epoch for day 0",
             first_of(cells)
         )),
         several => {

@@ -1,7 +1,8 @@
 //! What is said of a file without readings.
 
 use crate::reading::{CovariateKind, Unit, bracketed};
-use crate::runtime::ingest::{FileSurvey, Meaning, unit_in_name};
+use crate::runtime::ingest::{FileSurvey, IngestError, Meaning, unit_in_name};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Parts of the names of columns that may have what was added since the reading before.
@@ -13,50 +14,51 @@ const OF_EACH_READING: [&str; 5] = [
     "since previous",
 ];
 
+/// What is wrong with a file of which nothing can be watched.
+#[derive(Debug)]
+pub(super) struct UnusableFile {
+    pub(super) problem: String,
+    /// Whether a flag may mend it.
+    pub(super) has_a_flag: bool,
+}
+
+/// What is said of a file without columns of readings.
+const NOT_NAMED: &str =
+    "no column is named as readings are ([ID_]displacement_UNIT or [ID_]velocity_UNIT)";
+
 /// Which flag names the readings of a file where no column does; where one does, what is wrong with its rows.
 pub(super) fn without_readings(
     file: &Path,
     looked: &FileSurvey,
     covariates: &[(String, CovariateKind)],
-) -> String {
+) -> UnusableFile {
     let is_named = |(_, meaning): &(String, Meaning)| {
         matches!(meaning, Meaning::Reading { .. } | Meaning::Component { .. })
     };
     if let Some(fault) = &looked.fault
         && (looked.columns.is_empty() || looked.columns.iter().any(is_named))
     {
-        return format!("{fault}; no row of the file can be used");
+        return UnusableFile {
+            problem: format!("{fault}; no row of the file can be used"),
+            has_a_flag: fault.names_a_flag(),
+        };
     }
     if looked.columns.iter().any(is_named) {
-        return format!(
-            "{}: its columns of readings hold no number so far; run init again once they do, or give a former file of it and then write this \
-             one's path into the config",
-            file.display()
-        );
+        return UnusableFile {
+            problem: format!(
+                "{}: its columns of readings hold no number so far; run init again once they do, or give a former file of it and then write this \
+                 one's path into the config",
+                file.display()
+            ),
+            has_a_flag: false,
+        };
     }
     let numbers = looked.columns.iter().filter_map(|(name, meaning)| {
         matches!(meaning, Meaning::Covariate { .. }).then_some(name.as_str())
     });
     let numbers: Vec<&str> = numbers.collect();
-    let named = "no column is named as readings are ([ID_]displacement_UNIT or [ID_]velocity_UNIT)";
     if numbers.is_empty() {
-        let columns: Vec<&str> = looked
-            .columns
-            .iter()
-            .map(|(name, _)| name.as_str())
-            .collect();
-        return match &columns[..] {
-            [] => format!(
-                "{}: found no message and no row with a reading; give a file that has some",
-                file.display()
-            ),
-            columns => format!(
-                "{}: {named}, and none of its columns ({}) holds numbers; give a file that has some; where a title stands \
-                 above its header, the flag skip-lines says how many lines that has",
-                file.display(),
-                columns.join(", ")
-            ),
-        };
+        return without_numbers(file, looked);
     }
     let of_points = looked.columns.iter().filter(|(name, meaning)| {
         numbers.contains(&name.as_str()) && !is_covariate(name, meaning, covariates)
@@ -64,10 +66,12 @@ pub(super) fn without_readings(
     let first = of_points.map(|(name, _)| name.as_str()).next();
     let first = first.unwrap_or("NAME");
     let stated = looked.units_line.get(first);
-    let in_which = stated.map_or_else(String::new, |stated| {
+    let in_line = stated.and_then(|stated| Unit::parse(stated).ok());
+    let in_which = stated.filter(|_| in_line.is_none());
+    let in_which = in_which.map_or_else(String::new, |stated| {
         format!(" (the units line has {stated:?} for {first:?}, which is no unit that can be read)")
     });
-    let (quantity, unit) = match unit_at_end(first) {
+    let (quantity, unit) = match in_line.or_else(|| unit_at_end(first)) {
         Some(unit) => (unit.quantity().name(), unit.column_suffix()),
         // The name says nothing of a unit, or one that is not known.
         None if stated.is_some_and(|stated| stated.contains('/')) => {
@@ -79,15 +83,54 @@ pub(super) fn without_readings(
         None => ("displacement", "UNIT".to_owned()),
     };
     let example = format!("{first}=P1:{quantity}:{unit}");
-    format!(
-        "{}: {named}; its columns of numbers are \
+    let problem = format!(
+        "{}: {NOT_NAMED}; its columns of numbers are \
          {}: say which of them has the readings of which point, in which unit{in_which}, as in --column {example:?}; a UNIT is um, mm, cm, \
          m, in or ft, or one of these per min, h, day or yr (mm_per_day): what is in another one must be converted first; a column of rain, of a lake or the like is named by --covariate {:?}{}",
         file.display(),
         numbers.join(", "),
         format!("{first}=level"),
         coordinates(&numbers).map_or_else(String::new, |columns| by_hand(&columns)),
-    )
+    );
+    UnusableFile {
+        problem,
+        has_a_flag: true,
+    }
+}
+
+/// A name that stands more than once among these.
+fn twin<'a>(names: &[&'a str]) -> Option<&'a str> {
+    let mut met = BTreeSet::new();
+    names.iter().copied().find(|name| !met.insert(*name))
+}
+
+/// What is said of a file without a column of numbers.
+fn without_numbers(file: &Path, looked: &FileSurvey) -> UnusableFile {
+    let columns = looked.columns.iter().map(|(name, _)| name.as_str());
+    let columns: Vec<&str> = columns.collect();
+    let file = file.display();
+    let problem = match (&columns[..], &looked.fault) {
+        ([], _) => {
+            format!("{file}: found no message and no row with a reading; give a file that has some")
+        }
+        (_, Some(fault)) => {
+            format!("{file}: {NOT_NAMED}, and no row could be used; the first that cannot: {fault}")
+        }
+        (columns, None) if twin(columns).is_some() => format!(
+            "{file}: the name {:?} stands more than once in its header, and none of these columns is used: let the logger give each sensor a name \
+             of its own, or write the header so",
+            twin(columns).unwrap_or_default()
+        ),
+        (columns, None) => format!(
+            "{file}: {NOT_NAMED}, and none of its columns ({}) holds numbers; give a file that has some; where a title stands \
+             above its header, --skip-lines says how many lines that has",
+            columns.join(", ")
+        ),
+    };
+    UnusableFile {
+        problem,
+        has_a_flag: looked.fault.as_ref().is_some_and(IngestError::names_a_flag),
+    }
 }
 
 /// What is said of a column whose name says that its displacements count from the reading before.
@@ -103,16 +146,20 @@ pub(super) fn not_a_total(name: &str) -> Option<String> {
 }
 
 /// What is wrong with a benchmark of which most readings cannot be used.
-pub(super) fn mostly_refused(file: &Path, looked: &FileSurvey) -> Option<String> {
+pub(super) fn mostly_refused(file: &Path, looked: &FileSurvey) -> Option<UnusableFile> {
     let mut counts = looked.counts.iter();
     let (benchmark, (taken, refused)) = counts.find(|(_, (taken, refused))| refused > taken)?;
     let fault = looked.fault.as_ref()?;
-    Some(format!(
+    let problem = format!(
         "{}: {refused} of {} readings of benchmark {:?} cannot be used; the first row that cannot: {fault}",
         file.display(),
         taken + refused,
         benchmark.as_str()
-    ))
+    );
+    Some(UnusableFile {
+        problem,
+        has_a_flag: fault.names_a_flag(),
+    })
 }
 
 /// The covariates of a file, where it has numbers and each column of them is named as no reading is.

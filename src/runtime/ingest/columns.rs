@@ -140,6 +140,9 @@ fn in_stated_unit(name: &str, named: Unit, benchmark: &BenchmarkId, unit: Unit) 
 /// What a column of readings should have.
 const A_UNIT: &str = "a unit at its end: um, mm, cm, m, in or ft, a velocity per min, h, day or yr, such as displacement_mm or velocity_mm_per_h; or its unit stated, --column NAME=ID:QUANTITY:UNIT";
 
+/// What a header should have.
+const ONE_NAME_EACH: &str = "each name of a time or of readings once: let the logger give each sensor a name of its own, or write the header so";
+
 /// A header, understood.
 #[derive(Debug, Clone)]
 pub(super) struct Layout {
@@ -180,7 +183,28 @@ fn absent(names: &[String], options: &ReadOptions) -> Vec<ColumnMap> {
         .collect()
 }
 
+/// What is said of a name of covariates or of text that stands twice.
+fn not_used_as_twins(name: &str) -> Remark {
+    Remark::new(
+        format!("column {name:?}"),
+        "its name stands more than once in the header: none of these columns is used; give each its own name to have them".to_owned(),
+    )
+}
+
 impl NamedColumns {
+    /// Whether a column of this name has neither readings nor times, and nothing is stated of it.
+    fn is_idle(&self, name: &str, options: &ReadOptions) -> bool {
+        let mut vectors = options.vectors.iter();
+        let is_stated = options.columns.iter().any(|map| map.column == *name)
+            || vectors.any(|vector| vector.components.iter().any(|(one, _)| one == name))
+            || self
+                .absent
+                .iter()
+                .any(|map| in_unit_of(name, map).is_some());
+        let by_name = Layout::by_name(name, &options.dialect);
+        !is_stated && matches!(by_name, Ok(Err(Column::Channel { .. } | Column::Ignored)))
+    }
+
     /// Adds the column of this name, or says what is wrong with it and what was expected; `stem` is the benchmark of columns that
     /// name none.
     fn take(
@@ -271,6 +295,14 @@ impl Layout {
             ..NamedColumns::default()
         };
         for (index, name) in names.iter().enumerate() {
+            let is_twin = !name.is_empty() && names.iter().filter(|one| *one == name).count() > 1;
+            if is_twin && named.is_idle(name, options) {
+                if !names[..index].contains(name) {
+                    named.remarks.push(not_used_as_twins(name));
+                }
+                named.columns.push(Column::Ignored);
+                continue;
+            }
             Self::name_is_right(name, &names[..index])
                 .and_then(|()| named.take(name, &stem, options))
                 .map_err(|(problem, expected)| fail(name, problem, expected))?;
@@ -335,7 +367,7 @@ impl Layout {
     /// What is wrong with a name after those `before` it, and what was expected.
     fn name_is_right(name: &String, before: &[String]) -> Result<(), (&'static str, &'static str)> {
         if !name.is_empty() && before.contains(name) {
-            Err(("the name stands twice", "every name once"))
+            Err(("the name stands twice", ONE_NAME_EACH))
         } else {
             Ok(())
         }

@@ -12,9 +12,11 @@ use super::table::TableRows;
 use super::table_write::write_csv;
 use super::taken::LineResult;
 use super::text_format::{LineReader, TextFormat};
+use super::units_row;
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{Delimiter, Dialect};
 use ::csv::StringRecord;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A header and separated rows.
@@ -112,6 +114,11 @@ impl LineReader for CsvReader {
         self.rows.as_ref().map_or(&[], |rows| &rows.header)
     }
 
+    fn units_line(&self) -> BTreeMap<String, String> {
+        let rows = self.rows.as_ref();
+        rows.map_or_else(BTreeMap::new, |rows| rows.units.clone())
+    }
+
     fn columns(&self) -> Vec<String> {
         let rows = self.rows.as_ref();
         rows.map_or_else(Vec::new, |rows| rows.readings.names().to_vec())
@@ -130,7 +137,13 @@ pub struct CsvRows {
     /// The line in force, behind as many as are passed over; none where the latest one was not understood.
     header: Vec<String>,
     table: Option<TableRows>,
+    /// The names in the latest header, as they stand there.
+    names: Vec<String>,
     readings: HeaderReadings,
+    /// By column what the latest line of units below a header says.
+    units: BTreeMap<String, String>,
+    /// No row has come below the header, which such a line may follow.
+    is_below_header: bool,
     splitter: Splitter,
     cells: StringRecord,
 }
@@ -160,7 +173,10 @@ impl CsvRows {
             options: options.clone(),
             header: Vec::new(),
             table: None,
+            names: Vec::new(),
             readings: HeaderReadings::default(),
+            units: BTreeMap::new(),
+            is_below_header: false,
             splitter: Splitter::new(delimiter),
             cells: StringRecord::new(),
         };
@@ -214,6 +230,9 @@ impl CsvRows {
             self.table = None;
             return self.read_header(line, text).map(|()| Vec::new());
         }
+        if std::mem::take(&mut self.is_below_header) && self.is_of_units(line, text)? {
+            return Ok(Vec::new());
+        }
         match &mut self.table {
             Some(table) => table.items(line, &self.cells),
             None => Err(IngestError::NoHeader {
@@ -255,9 +274,36 @@ impl CsvRows {
         self.cells.iter().any(is_name)
     }
 
+    /// Takes a line of units below the header, where this is one: columns that are readings with their unit become such.
+    fn is_of_units(&mut self, line: u64, text: &str) -> Result<bool, IngestError> {
+        let Some(table) = &mut self.table else {
+            return Ok(false);
+        };
+        let (names, maps) = (&self.names, &self.options.columns);
+        let Some(units) = units_row::units_of(&self.cells, names, &self.options.dialect) else {
+            return Ok(false);
+        };
+        let contradictions = units_row::contradictions(names, &units, maps);
+        let full = units_row::with_units(names, &units, maps);
+        self.units = units;
+        if full == table.names() {
+            table.add_remarks(contradictions);
+        } else {
+            let mut layout = Layout::new(&self.file, line, full, &self.options)?;
+            self.readings.follow(line, &mut layout);
+            layout.remarks.extend(contradictions);
+            self.table = Some(TableRows::new(&self.file, layout, &self.options));
+        }
+        self.header.push(text.to_owned());
+        Ok(true)
+    }
+
     fn read_header(&mut self, line: u64, text: &str) -> Result<(), IngestError> {
-        let names = self.cells.iter().map(str::to_owned).collect();
+        self.names = self.cells.iter().map(str::to_owned).collect();
+        // A header that comes again has the units below it again.
+        let names = units_row::with_units(&self.names, &self.units, &self.options.columns);
         let mut layout = Layout::new(&self.file, line, names, &self.options)?;
+        self.is_below_header = true;
         self.readings.follow(line, &mut layout);
         self.table = Some(TableRows::new(&self.file, layout, &self.options));
         // A reader that goes on from a later line takes them as the file's first: blank ones pass for those before the header.

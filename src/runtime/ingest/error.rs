@@ -231,6 +231,21 @@ fn beginning(value: &str) -> String {
 }
 
 impl IngestError {
+    /// Whether what was expected can be had by a flag: whatever stands in the file is left out of account.
+    pub fn names_a_flag(&self) -> bool {
+        let expected = if let Self::Header { expected, .. }
+        | Self::Field { expected, .. }
+        | Self::Inconsistent { expected, .. } = self
+        {
+            *expected
+        } else if let Self::Record { problem, .. } = self {
+            problem.expected
+        } else {
+            return false;
+        };
+        expected.contains("(--") || expected.contains(", --")
+    }
+
     /// What to say of a file that is left out for it where others have readings; `None` where it is to be refused.
     pub fn left_out(&self) -> Option<Remark> {
         let Self::NoTopics { topics, .. } = self else {

@@ -28,6 +28,7 @@ mod text_format;
 mod text_formats;
 mod toa5;
 mod units;
+mod units_row;
 mod vector;
 
 pub use bytes::{is_packed, unpack, unpacked_name};
@@ -46,7 +47,7 @@ pub use names::unit_in_name;
 pub use ndjson::NDJSON;
 pub use ndjson_write::write_ndjson;
 pub use remark::Remark;
-pub use survey::{Survey, survey};
+pub use survey::{Survey, survey, survey_objects};
 pub use table_write::{write_csv, write_toa5};
 pub use taken::LineResult;
 pub use text::{FileSurvey, TextRows, look_through};

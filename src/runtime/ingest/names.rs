@@ -52,20 +52,38 @@ pub fn unit_in_name(column: &str) -> Option<Unit> {
     }
 }
 
+/// The name of a column of readings with its unit, `5_displacement_mm` of `5_displacement` in mm; `None` where it is no reading by that.
+pub(super) fn with_unit_of_motion(name: &str, unit: Unit) -> Option<String> {
+    let full = format!("{name}_{}", unit.column_suffix());
+    matches!(name_of(&full), Name::Measure(..)).then_some(full)
+}
+
 /// The column `name` where it differs from that of `map` only by its unit, which is then that of the readings: where the name in `map` states a
 /// unit, and no other one is stated of it.
 pub(super) fn in_unit_of(name: &str, map: &ColumnMap) -> Option<ColumnMap> {
-    let (Name::Measure(own_id, Measure::Reading(own)), Name::Measure(id, Measure::Reading(unit))) =
-        (name_of(&map.column), name_of(name))
-    else {
-        return None;
+    let (own, unit) = match (name_of(&map.column), name_of(name)) {
+        (
+            Name::Measure(own_id, Measure::Reading(own)),
+            Name::Measure(id, Measure::Reading(unit)),
+        ) if own_id == id => (own, unit),
+        // Both names are the same but for what stands in brackets at their ends: `Ext1 [mm]` and `Ext1 [cm]`.
+        _ => {
+            let (before, own) = before_brackets(&map.column)?;
+            let (same, unit) = before_brackets(name)?;
+            (before == same).then_some((own, unit))?
+        }
     };
-    let is_same = own_id == id && own.quantity() == unit.quantity();
-    (is_same && map.measure == Measure::Reading(own)).then(|| ColumnMap {
+    (own.quantity() == unit.quantity() && map.measure == Measure::Reading(own)).then(|| ColumnMap {
         column: name.to_owned(),
         benchmark: map.benchmark.clone(),
         measure: Measure::Reading(unit),
     })
+}
+
+/// What stands before the unit in brackets at the end of a name, and that unit.
+fn before_brackets(name: &str) -> Option<(&str, Unit)> {
+    let at = name.rfind(['[', '('])?;
+    Some((name[..at].trim_end(), Unit::in_brackets_of(name)?))
 }
 
 fn measure_at(plain: &str, at: usize, keyword: &str) -> Option<Measure> {
@@ -140,6 +158,13 @@ mod tests {
         assert_eq!(in_metres.measure, Measure::Reading(metres));
         for other in ["e_displacement_m", "d_velocity_m_per_day", "d"] {
             assert_eq!(in_unit_of(other, &map), None, "{other}");
+        }
+        let bracketed: ColumnMap = "Ext1 [mm]=5:displacement:mm".parse().unwrap();
+        let in_centimetres = in_unit_of("Ext1 (cm)", &bracketed).unwrap();
+        let centimetres = Unit::parse("cm").unwrap();
+        assert_eq!(in_centimetres.measure, Measure::Reading(centimetres));
+        for other in ["Ext2 [cm]", "Ext1 [mm/h]", "Ext1 [furlong]", "Ext1"] {
+            assert_eq!(in_unit_of(other, &bracketed), None, "{other}");
         }
         let restated: ColumnMap = "d_displacement_mm=5:displacement:cm".parse().unwrap();
         assert_eq!(in_unit_of("d_displacement_m", &restated), None);

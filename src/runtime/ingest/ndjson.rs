@@ -210,7 +210,8 @@ impl NdjsonRows {
     }
 }
 
-fn cell(value: &Value) -> String {
+/// What a value is in a cell of a table.
+pub(super) fn cell(value: &Value) -> String {
     match value {
         Value::Null => String::new(),
         Value::String(text) => text.trim().to_owned(),

@@ -4,10 +4,13 @@ use super::bytes::read_bytes;
 use super::csv::stands_before_header;
 use super::encoding::{Transcoder, latin1};
 use super::names::unit_in_name;
+use super::ndjson::cell;
 use super::split::Splitter;
+use super::units_row;
 use super::{IngestError, Remark};
 use crate::reading::{Delimiter, Dialect};
 use ::csv::StringRecord;
+use serde_json::{Map, Value};
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -18,6 +21,9 @@ const MOST_ROWS: usize = 200_000;
 const THE_HEADER: &str = "the header of the rows; where other lines stand before it, skip_lines (--skip-lines) with their number";
 /// and where their cells cannot be distinguished.
 const A_DELIMITER: &str = "commas, semicolons or tabs between the cells: let the logger write one of them, or replace what stands there";
+
+/// and where its lines cannot.
+const LINE_FEEDS: &str = "line feeds: tr '\\r' '\\n' writes them";
 
 /// A table of text, read as nothing but cells.
 #[derive(Debug, Clone)]
@@ -62,12 +68,7 @@ pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
     };
     if bytes.contains(&b'\r') && !bytes.contains(&b'\n') {
         let problem = "its lines end in carriage returns alone";
-        return Err(bad(
-            1,
-            "(any)",
-            problem,
-            "line feeds: tr '\\r' '\\n' writes them",
-        ));
+        return Err(bad(1, "(any)", problem, LINE_FEEDS));
     }
     let empty = |missing| IngestError::Empty {
         file: file.into(),
@@ -96,7 +97,13 @@ pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
     // Behind a last mark there may be nothing, with no name.
     let unnamed = names.iter().rev().take_while(|name| name.is_empty());
     let least = names.len() - unnamed.count();
-    let columns = match columns(lines, header, &mut splitter, (least, names.len())) {
+    let below = RowsBelow {
+        header,
+        names: &names,
+        least,
+        dialect,
+    };
+    let columns = match below.columns(lines, &mut splitter) {
         Ok(columns) if columns.iter().all(Vec::is_empty) => return Err(empty("row")),
         Ok(columns) => columns,
         Err(problem) => {
@@ -111,32 +118,83 @@ pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
     })
 }
 
-/// The cells of each column below `header`, in rows of at least and at most so many cells.
-fn columns<'a>(
-    lines: impl Iterator<Item = Cow<'a, str>>,
-    header: &str,
-    splitter: &mut Splitter,
-    (least, most): (usize, usize),
-) -> Result<Vec<Vec<String>>, &'static str> {
-    let mut cells = StringRecord::new();
-    let (mut columns, mut is_other_table) = (vec![Vec::new(); most], false);
-    for line in lines.take(MOST_ROWS) {
-        // A logger that starts again writes its header again.
-        if line.trim_end() == header.trim_end() {
+/// The same of the objects in a file of messages that are rows of a table, with the keys of the first one for a header; `None` where it has none.
+///
+/// # Errors
+/// [`IngestError`] where it cannot be read.
+pub fn survey_objects(file: &Path) -> Result<Option<Survey>, IngestError> {
+    let bytes = read_bytes(file)?;
+    let (mut names, mut columns) = (Vec::<String>::new(), Vec::<Vec<String>>::new());
+    for line in bytes.split(|byte| *byte == b'\n').take(MOST_ROWS) {
+        let Ok(object) = serde_json::from_slice::<Map<String, Value>>(line) else {
+            continue;
+        };
+        if object.contains_key("benchmark") || object.contains_key("channel") {
             continue;
         }
-        if splitter.split(&line, &mut cells).is_ok() && (least..=most).contains(&cells.len()) {
-            for (index, column) in columns.iter_mut().enumerate() {
-                column.push(cells.get(index).unwrap_or_default().to_owned());
-            }
-        } else {
-            is_other_table |= !line.trim().is_empty();
+        let keys: Vec<String> = object.keys().map(|key| key.trim().to_owned()).collect();
+        if names.is_empty() {
+            columns = vec![Vec::new(); keys.len()];
+            names = keys;
+        } else if names != keys {
+            continue;
+        }
+        for (column, value) in columns.iter_mut().zip(object.values()) {
+            column.push(cell(value));
         }
     }
-    if is_other_table && columns.iter().all(Vec::is_empty) {
-        return Err("no row below has as many cells");
+    Ok((!names.is_empty()).then_some(Survey {
+        delimiter: Delimiter::Comma,
+        names,
+        columns,
+        encoding: None,
+    }))
+}
+
+/// What the rows below a header are read by.
+struct RowsBelow<'a> {
+    header: &'a str,
+    names: &'a [String],
+    /// Cells that a row has at least.
+    least: usize,
+    dialect: &'a Dialect,
+}
+
+impl RowsBelow<'_> {
+    /// The cells of each column; a line of units is none of the rows.
+    fn columns<'a>(
+        &self,
+        lines: impl Iterator<Item = Cow<'a, str>>,
+        splitter: &mut Splitter,
+    ) -> Result<Vec<Vec<String>>, &'static str> {
+        let (least, most) = (self.least, self.names.len());
+        let mut cells = StringRecord::new();
+        let (mut columns, mut is_other_table) = (vec![Vec::new(); most], false);
+        let mut is_below_header = true;
+        for line in lines.take(MOST_ROWS) {
+            // A logger that starts again writes its header again.
+            if line.trim_end() == self.header.trim_end() {
+                is_below_header = true;
+                continue;
+            }
+            if splitter.split(&line, &mut cells).is_ok() && (least..=most).contains(&cells.len()) {
+                if std::mem::take(&mut is_below_header)
+                    && units_row::units_of(&cells, self.names, self.dialect).is_some()
+                {
+                    continue;
+                }
+                for (index, column) in columns.iter_mut().enumerate() {
+                    column.push(cells.get(index).unwrap_or_default().to_owned());
+                }
+            } else {
+                is_other_table |= !line.trim().is_empty();
+            }
+        }
+        if is_other_table && columns.iter().all(Vec::is_empty) {
+            return Err("no row below has as many cells");
+        }
+        Ok(columns)
     }
-    Ok(columns)
 }
 
 /// What parts the names of a header that has no comma, semicolon or tab.

@@ -61,6 +61,11 @@ impl TableRows {
         &self.layout.names
     }
 
+    /// What has been found out about the columns from elsewhere.
+    pub(super) fn add_remarks(&mut self, remarks: Vec<Remark>) {
+        self.remarks.extend(remarks);
+    }
+
     /// What one row holds; `line` is its number in the file. A cell that is no number costs its own value alone: what is wrong with
     /// it is to be asked with [`TableRows::take_fault`].
     pub(super) fn items(

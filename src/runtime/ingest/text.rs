@@ -200,13 +200,15 @@ fn not_utf8(
 pub struct FileSurvey {
     /// What its columns are taken for; none for messages.
     pub columns: Vec<(String, Meaning)>,
+    /// The names of its columns, of every header that it has had.
+    pub names: Vec<String>,
     /// Whose readings it has, in which units.
     pub readings: BTreeSet<(BenchmarkId, Unit)>,
     /// What is wrong with the first row that cannot be used.
     pub fault: Option<IngestError>,
     /// How many readings of each benchmark can be used, and how many cannot as something is wrong with their rows.
     pub counts: BTreeMap<BenchmarkId, (usize, usize)>,
-    /// By column what a line of units says of it, where that is no unit that can be read.
+    /// By column what a line of units below the header says of it, where its name does not have that.
     pub units_line: BTreeMap<String, String>,
 }
 
@@ -263,6 +265,7 @@ pub fn look_through(
         }
     }
     looked.columns = rows.meanings();
+    looked.names = rows.0.columns();
     looked.units_line = rows.units_line();
     Ok(looked)
 }

@@ -50,7 +50,7 @@ pub trait LineReader: Debug + Send {
         Vec::new()
     }
 
-    /// By column what a line of units below the header says of it, where that is no unit that can be read.
+    /// By column what a line of units below the header says of it, where its name does not have that.
     fn units_line(&self) -> BTreeMap<String, String> {
         BTreeMap::new()
     }

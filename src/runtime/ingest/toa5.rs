@@ -8,7 +8,7 @@
 use super::again::HeaderReadings;
 use super::column_map::{ColumnMap, Measure};
 use super::columns::{Column, Layout, Meaning};
-use super::names::{Name, channel_unit, name_of};
+use super::names::{Name, channel_unit, name_of, with_unit_of_motion};
 use super::remark::Remark;
 use super::split::Splitter;
 use super::table::TableRows;
@@ -294,11 +294,8 @@ impl Toa5Rows {
 
 /// The name of a column whose own has no unit, with that of the units line where it is a known one.
 fn with_unit(name: &str, unit: &str, stated: Option<Unit>) -> String {
-    if let Some(stated) = stated {
-        let full = format!("{name}_{}", stated.column_suffix());
-        if matches!(name_of(&full), Name::Measure(..)) {
-            return full;
-        }
+    if let Some(full) = stated.and_then(|stated| with_unit_of_motion(name, stated)) {
+        return full;
     }
     match known_suffix(unit) {
         Some(suffix) if channel_unit(name).is_none() => format!("{name}_{suffix}"),
