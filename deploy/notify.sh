@@ -12,7 +12,7 @@ resolved) state=ended ;;
 esac
 forecast=
 if [ "$SLIPWATCH_STATE" = firing ]; then
-    forecast=${SLIPWATCH_FAILURE_TIME:+, collapse forecast (median) $SLIPWATCH_FAILURE_TIME}
+    forecast=${SLIPWATCH_FAILURE_TIME:+, collapse forecast (median, on the early side) $SLIPWATCH_FAILURE_TIME}
 fi
 line="[$SLIPWATCH_STATUS] $SLIPWATCH_SITE: $SLIPWATCH_LEVEL $state at benchmark ${SLIPWATCH_BENCHMARK:-(site)}, $SLIPWATCH_TIME$forecast${SLIPWATCH_RECOMMENDED:+. $SLIPWATCH_RECOMMENDED}${SLIPWATCH_TEXT:+ $SLIPWATCH_TEXT}"
 if [ $# -gt 0 ]; then

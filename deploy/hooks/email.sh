@@ -58,11 +58,13 @@ encoded() {
     red/resolved | orange/resolved)
         printf '\nThis is no all-clear: somebody has to look at the slope before anyone goes back.\n' ;;
     esac
-    if [ -n "${SLIPWATCH_TEXT:-}" ]; then
-        printf '\n%s.\n\n' "$(plain "$SLIPWATCH_TEXT")"
+    # With its times by the clocks at the site.
+    text=${SLIPWATCH_TEXT_LOCAL:-${SLIPWATCH_TEXT:-}}
+    if [ -n "$text" ]; then
+        printf '\n%s.\n\n' "$(plain "$text")"
     fi
     if [ -n "${SLIPWATCH_FAILURE_TIME:-}" ] && [ "$SLIPWATCH_STATE" = firing ]; then
-        printf 'Collapse forecast (median): %s\n' "$(at_the_site "$SLIPWATCH_FAILURE_TIME")"
+        printf 'Collapse forecast (median): %s. It is put on the early side: the chance of a collapse before it may be under one half, and it may come earlier or later\n' "$(at_the_site "$SLIPWATCH_FAILURE_TIME")"
     fi
     if [ -n "${SLIPWATCH_ACKNOWLEDGE_URL:-}" ]; then
         printf 'To acknowledge (the link works once): %s\n' "$(plain "$SLIPWATCH_ACKNOWLEDGE_URL")"

@@ -50,11 +50,12 @@ case $SLIPWATCH_LEVEL/$SLIPWATCH_STATE in
 red/resolved | orange/resolved) todo='This is no all-clear: somebody has to look at the slope before anyone goes back.' ;;
 *) todo= ;;
 esac
+said=${SLIPWATCH_TEXT_LOCAL:-${SLIPWATCH_TEXT:-}}
 forecast=
 if [ -n "${SLIPWATCH_FAILURE_TIME:-}" ] && [ "$SLIPWATCH_STATE" = firing ]; then
-    forecast="; collapse forecast (median) $(at_the_site "$SLIPWATCH_FAILURE_TIME")"
+    forecast="; collapse forecast (median, on the early side) $(at_the_site "$SLIPWATCH_FAILURE_TIME")"
 fi
-text="${todo:+$todo }At $(at_the_site "$SLIPWATCH_TIME")$forecast${SLIPWATCH_TEXT:+; $SLIPWATCH_TEXT}"
+text="${todo:+$todo }At $(at_the_site "$SLIPWATCH_TIME")$forecast${said:+; $said}"
 token_file="$(dirname "$0")/ntfy.token"
 if [ -r "$token_file" ]; then
     # Over standard input: the command line can be read by everyone on the machine.

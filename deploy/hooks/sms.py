@@ -129,8 +129,11 @@ def message(environment, alert):
     if forecast and state == "firing":
         words.append(f"Collapse forecast {minute(forecast, zone)}.")
     # The place and the level stand above already, and by which span a chance counts is too long for this.
-    _, _, figures = alert.get("text", "").partition(": ")
+    said = environment.get("SLIPWATCH_TEXT_LOCAL") or alert.get("text", "")
+    _, _, figures = said.partition(": ")
     figures = figures.removeprefix(level).removeprefix(" ends").lstrip("; ")
+    # Of a level that comes from the past the figures are more than where they were found.
+    figures = re.sub(r", found in the readings from before [^;]*; nothing since has ended it", "", figures)
     figures = re.sub(r" \([^)]*\)", "", figures).replace(" %", "%")
     words.append(f"At {minute(environment['SLIPWATCH_TIME'], zone)}{': ' if figures else ''}{figures}")
     text = plain(" ".join(words))

@@ -69,6 +69,21 @@ impl Policy {
         )
     }
 
+    /// What ends a level that is in force, in words; `None` of what no motion ends.
+    pub fn end_in_words(&self, level: Level) -> Option<String> {
+        let pauses = match level {
+            Level::Red => ", and no chance calls orange",
+            Level::Orange | Level::Yellow => "",
+            Level::Green | Level::Unknown => return None,
+        };
+        Some(format!(
+            "less is called{pauses}, and the slope has slowed to half of its highest velocity for {}, or has moved no faster than when the level was \
+             called, under the critical velocity and without gaining, for {}; a lower forecast alone does not end it",
+            span_in_words(self.evacuation_time),
+            span_in_words(self.steady_for)
+        ))
+    }
+
     /// The condition of a rule with its figures, as words; `None` for a rule that the policy has no figure for.
     pub fn condition(&self, rule: &str, level: Level) -> Option<String> {
         let threshold = |figure: &dyn Fn(&super::Threshold) -> Option<f64>| {
@@ -150,5 +165,15 @@ mod tests {
         assert!(outlook(Level::Yellow).contains("of 0.3 or more"));
         assert_eq!(policy.condition("velocity-threshold", Level::Red), None);
         assert_eq!(policy.condition("no-data", Level::Unknown), None);
+        let ends = |level| policy.end_in_words(level);
+        let red = ends(Level::Red).unwrap();
+        assert!(
+            red.contains("no chance calls orange")
+                && red.contains("for 24 h")
+                && red.contains("for 7 days"),
+            "{red}"
+        );
+        assert!(!ends(Level::Yellow).unwrap().contains("orange"));
+        assert_eq!(ends(Level::Unknown), None);
     }
 }

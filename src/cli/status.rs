@@ -110,6 +110,8 @@ pub(super) struct SiteStatus {
     acknowledged: Vec<Event>,
     /// The alerts that have ended and that nobody has acknowledged, the newest of each place.
     returned: Vec<Event>,
+    /// When each of these ended.
+    returned_ended: Vec<Timestamp>,
     /// The orders by which no hook is run.
     silences: Vec<Event>,
     /// Alerts in force that a hook did not take and will not: it is not in the config any more.
@@ -198,6 +200,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
     let sources_without_files = sources_without_files(&config);
     let is_running = Store::is_held(&config.site.state_dir);
     let zone = config.site.time_zone;
+    let returned = alarms.returned();
     let status = SiteStatus {
         site: config.site.name,
         benchmarks: each.collect(),
@@ -207,7 +210,8 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         site_unknown_since: levels.get(&(None, Level::Unknown)).and_then(dated),
         is_running,
         acknowledged: orders.acknowledged(&levels),
-        returned: alarms.returned().into_iter().cloned().collect(),
+        returned_ended: returned.iter().map(|one| one.ended).collect(),
+        returned: returned.into_iter().map(|one| one.event).collect(),
         silences: orders.silences(clock::now()),
         closed: closed(&store, &levels)?,
         quarantined: store.quarantined()?,
@@ -387,8 +391,8 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     );
     let legend = "collapse: median of the forecast, on the early side\nchance: of collapse within twice the evacuation time (or red_within) of the next\n\
                   reading, by which red is called";
-    let alerts = listed("in force", &status.alerts, zone)
-        + &listed("ended, not acknowledged", &status.returned, zone);
+    let ended = status.returned.iter().zip(&status.returned_ended);
+    let alerts = text::listed("in force", &status.alerts, zone) + &text::returned(ended, zone);
     format!("{}\n{table}{legend}\n{}", folded(&head), folded(&alerts))
 }
 
@@ -439,15 +443,6 @@ fn not_used(status: &SiteStatus, zone: &TimeZone) -> String {
         );
     }
     lines
-}
-
-/// The events, a line each, under a title; nothing where there are none.
-fn listed(title: &str, events: &[Event], zone: &TimeZone) -> String {
-    if events.is_empty() {
-        return String::new();
-    }
-    let lines = events.iter().map(|event| text::line(event, zone) + "\n");
-    format!("\n{title}:\n{}", lines.collect::<String>())
 }
 
 /// Lines of no more than the table's width.

@@ -1,8 +1,8 @@
 //! Events as lines for people.
 
 use crate::monitor::{Event, EventKind};
-pub(super) use crate::reading::plain;
-use crate::reading::{BEFORE_ALL, Timestamp, minute};
+use crate::reading::{Timestamp, minute};
+pub(super) use crate::reading::{clock, local, plain};
 use jiff::tz::TimeZone;
 use textwrap::{Options, WordSplitter};
 
@@ -32,82 +32,63 @@ pub(super) fn wrapped(line: &str, columns: usize, indent: &str) -> String {
     textwrap::fill(line, options.word_splitter(WordSplitter::NoHyphenation))
 }
 
-/// The text with its times in UTC as the clocks of `zone` show them.
-pub(super) fn local(text: &str, zone: &TimeZone) -> String {
-    if *zone == TimeZone::UTC {
-        return text.to_owned();
+/// The events, a line each, under a title; nothing where there are none.
+pub(super) fn listed(title: &str, events: &[Event], zone: &TimeZone) -> String {
+    if events.is_empty() {
+        return String::new();
     }
-    let mut out = String::with_capacity(text.len() + 8);
-    let mut rest = text;
-    while let Some(letter) = rest.chars().next() {
-        let (shown, length) = match time_at(rest) {
-            Some((time, length)) => (clock(time, zone), length),
-            None => (letter.to_string(), letter.len_utf8()),
+    let lines = events.iter().map(|event| line(event, zone) + "\n");
+    format!("\n{title}:\n{}", lines.collect::<String>())
+}
+
+/// Alerts that have ended and that nobody has acknowledged, each with the time of its end; nothing where there are none.
+pub(super) fn returned<'a>(
+    ended: impl Iterator<Item = (&'a Event, &'a Timestamp)>,
+    zone: &TimeZone,
+) -> String {
+    let lines = ended.filter_map(|(event, ended)| {
+        let EventKind::Alert { level, text, .. } = &event.kind else {
+            return None;
         };
-        out.push_str(&shown);
-        rest = &rest[length..];
+        let place = event.benchmark.as_ref().map_or("site", |id| id.as_str());
+        let (from, to) = (clock(event.time, zone), clock(*ended, zone));
+        let (place, text) = (plain(place), local(&plain(text), zone));
+        Some(format!("{from}  {place}  {level}, ended {to}: {text}\n"))
+    });
+    let lines: String = lines.collect();
+    if lines.is_empty() {
+        return lines;
     }
-    out
-}
-
-/// The time in UTC with which `text` begins, and its length.
-fn time_at(text: &str) -> Option<(Timestamp, usize)> {
-    let is_like = |(byte, like): (u8, u8)| match like {
-        b'0' => byte.is_ascii_digit(),
-        b'T' => byte == b'T' || byte == b' ',
-        other => byte == other,
-    };
-    let start = text.as_bytes().get(..MINUTE.len())?;
-    if !start.iter().copied().zip(MINUTE.bytes()).all(is_like) {
-        return None;
-    }
-    let rest = &text[MINUTE.len()..];
-    let seconds = rest.find(|letter: char| !matches!(letter, ':' | '.' | '0'..='9'))?;
-    let length = MINUTE.len() + seconds + 1;
-    let is_utc = rest[seconds..].starts_with('Z');
-    let seconds = if seconds == 0 {
-        ":00"
-    } else {
-        &rest[..seconds]
-    };
-    let time = format!("{}{seconds}Z", &text[..MINUTE.len()])
-        .parse()
-        .ok()?;
-    is_utc.then_some((time, length))
-}
-
-/// How a time begins.
-const MINUTE: &str = "0000-00-00T00:00";
-
-/// To the minute, as a clock there shows it.
-pub(super) fn clock(time: Timestamp, zone: &TimeZone) -> String {
-    if *zone == TimeZone::UTC || time <= BEFORE_ALL {
-        return minute(time);
-    }
-    let local = time.to_zoned(zone.clone());
-    local.strftime("%Y-%m-%d %H:%M %Z").to_string()
+    format!("\nended, not acknowledged:\n{lines}")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::alert::Level;
+    use crate::monitor::AlertState;
+    use crate::reading::BenchmarkId;
 
     #[test]
-    fn times_of_a_text_are_shown_by_the_clocks_of_the_zone_and_nothing_else_changes() {
+    fn an_alert_that_has_ended_is_shown_with_both_its_times_by_the_clocks_of_the_zone() {
         let rome = TimeZone::get("Europe/Rome").unwrap();
-        for (text, shown) in [
-            ("2017-06-05 01:00Z  P1", "2017-06-05 03:00 CEST  P1"),
-            ("since 2017-01-05T23:30:00Z.", "since 2017-01-06 00:30 CET."),
-            (
-                "at 2017-06-05T01:00:00.25Z, é",
-                "at 2017-06-05 03:00 CEST, é",
-            ),
-            ("2017-06-05T01:00:00+02:00", "2017-06-05T01:00:00+02:00"),
-            ("2017-06-05 01:00", "2017-06-05 01:00"),
-            ("x 2017-06-05é", "x 2017-06-05é"),
-        ] {
-            assert_eq!(local(text, &rome), shown);
-            assert_eq!(local(text, &TimeZone::UTC), text);
-        }
+        let event = Event {
+            time: "2017-06-05T01:00:00Z".parse().unwrap(),
+            benchmark: Some(BenchmarkId::new("N3")),
+            kind: EventKind::Alert {
+                level: Level::Yellow,
+                state: AlertState::Firing,
+                key: "N3/yellow/2017-06-05T01:00:00Z".to_owned(),
+                rule: "chance-within-outlook".to_owned(),
+                text: "benchmark N3: yellow; chance of collapse 31 % within 30 days".to_owned(),
+            },
+        };
+        let ended: Timestamp = "2017-06-07T10:00:00Z".parse().unwrap();
+        let shown = returned([(&event, &ended)].into_iter(), &rome);
+        assert!(
+            shown.contains("2017-06-05 03:00 CEST  N3  yellow, ended 2017-06-07 12:00 CEST: "),
+            "{shown}"
+        );
+        assert_eq!(returned([].into_iter(), &rome), "");
     }
 }

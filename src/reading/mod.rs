@@ -9,6 +9,7 @@ mod dialect;
 mod figure;
 mod leading_zeros;
 mod line_fit;
+mod local_times;
 mod median;
 mod normal;
 pub mod other_unit;
@@ -27,6 +28,7 @@ pub use dialect::{DecimalMark, Delimiter, Dialect, MOST_SKIPPED, ThousandsMark, 
 pub use figure::{counted, figure, shortest, whole_figure};
 pub use jiff::Timestamp;
 pub use line_fit::LineFit;
+pub use local_times::{clock, local};
 pub use median::{upper_median, upper_median_by};
 pub use normal::{
     CHI_SQUARED_90, DEVIATION_PER_MEDIAN, HALF_WIDTH_90, HALF_WIDTH_95, NORMAL_MEDIAN,

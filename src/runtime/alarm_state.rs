@@ -58,8 +58,24 @@ impl AlarmState {
 #[derive(Debug, Clone)]
 struct NewestAlert {
     event: Event,
-    has_ended: bool,
+    /// When it ended.
+    ended: Option<Timestamp>,
     is_acknowledged: bool,
+}
+
+impl NewestAlert {
+    fn has_ended(&self) -> bool {
+        self.ended.is_some()
+    }
+}
+
+/// An alert that has ended and that nobody has acknowledged.
+#[derive(Debug, Clone)]
+pub struct ReturnedAlert {
+    /// Its beginning.
+    pub event: Event,
+    /// When it ended.
+    pub ended: Timestamp,
 }
 
 /// What the alarms of a site stand by at a moment.
@@ -131,8 +147,8 @@ impl Alarms {
             return muted;
         }
         match newest {
-            Some(one) if !one.has_ended && !one.is_acknowledged => AlarmState::Unacknowledged,
-            Some(one) if !one.has_ended => {
+            Some(one) if !one.has_ended() && !one.is_acknowledged => AlarmState::Unacknowledged,
+            Some(one) if !one.has_ended() => {
                 let is_held = called.is_some_and(|called| Some(called.level) < one.level());
                 if is_held {
                     AlarmState::Latched
@@ -191,19 +207,22 @@ impl Alarms {
     }
 
     /// The alerts that have ended, are the newest of their place, and were not acknowledged.
-    pub fn returned(&self) -> Vec<&Event> {
-        let ended = self
-            .newest
-            .values()
-            .filter(|one| one.has_ended && !one.is_acknowledged);
-        ended.map(|one| &one.event).collect()
+    pub fn returned(&self) -> Vec<ReturnedAlert> {
+        let unseen = self.newest.values().filter(|one| !one.is_acknowledged);
+        let returned = unseen.filter_map(|one| {
+            Some(ReturnedAlert {
+                event: one.event.clone(),
+                ended: one.ended?,
+            })
+        });
+        returned.collect()
     }
 
     /// Whether there is nothing at `place`, or anywhere without it, that could be acknowledged.
     pub fn is_all_seen(&self, place: Option<&BenchmarkId>) -> bool {
         let here = (self.newest.iter()).filter(|(at, _)| place.is_none() || at.as_ref() == place);
         here.into_iter()
-            .all(|(_, one)| one.has_ended && one.is_acknowledged)
+            .all(|(_, one)| one.has_ended() && one.is_acknowledged)
     }
 
     fn muted(
@@ -225,7 +244,7 @@ impl Alarms {
             }
             // A level that was called after the order is higher than the one that it is of.
             let concerns = |alert: &Event| self.orders.concerns(silence, alert);
-            let is_of_it = newest.is_none_or(|one| one.has_ended || concerns(&one.event));
+            let is_of_it = newest.is_none_or(|one| one.has_ended() || concerns(&one.event));
             found = found.or(is_of_it.then_some(AlarmState::Shelved));
         }
         found
@@ -284,7 +303,7 @@ fn take(newest: &mut BTreeMap<Option<BenchmarkId>, NewestAlert>, event: Event) {
         }
         AlertState::Firing => {
             let one = NewestAlert {
-                has_ended: false,
+                ended: None,
                 is_acknowledged: false,
                 event,
             };
@@ -294,7 +313,7 @@ fn take(newest: &mut BTreeMap<Option<BenchmarkId>, NewestAlert>, event: Event) {
             if let Some(one) = newest.get_mut(&event.benchmark)
                 && key(&one.event) == key(&event)
             {
-                one.has_ended = true;
+                one.ended = Some(event.time);
             }
         }
     }

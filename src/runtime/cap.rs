@@ -399,13 +399,14 @@ fn parameters(out: &mut String, alert: &Alert, level: Level, rule: &str, correct
     }
 }
 
-/// CAP's words: observed; likely, over one half; possible, less.
+/// CAP's words: observed; likely; possible. Red is never less certain than orange, as receivers leave out what is: its chance is that of the next
+/// two evacuation times alone, and the one within the outlook is higher.
 fn certainty(level: Level, rule: &str) -> &'static str {
     if level == Level::Unknown {
         "Unknown"
     } else if is_observed(rule) {
         "Observed"
-    } else if level == Level::Orange {
+    } else if matches!(level, Level::Orange | Level::Red) {
         "Likely"
     } else {
         "Possible"

@@ -8,8 +8,9 @@ use super::sandbox::{self, CANNOT_RUN, CANNOT_RUN_BECAUSE};
 use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::monitor::{CLOCK_FAULT, Event, EventKind};
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, Timestamp, local};
 use crate::store::AlertIdentity;
+use jiff::tz::TimeZone;
 use processes::{ProcessGroup, RUN, kill_all_of, run_name};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -52,7 +53,7 @@ pub struct Alert {
     pub key: String,
     /// The site's name.
     pub site: String,
-    /// The benchmark's forecast of failure when the alert was called, its median.
+    /// The benchmark's forecast of failure when the alert was called: its median, which is put on the early side.
     pub failure_time: Option<Timestamp>,
     /// Of an end: the time that people were given of its call; none in an outbox of older versions.
     #[serde(default)]
@@ -79,7 +80,7 @@ pub struct HookBody<'a> {
     correction: Option<CorrectionIdentity<'a>>,
     /// The site's name.
     site: &'a str,
-    /// The benchmark's forecast of failure when the alert was called, its median.
+    /// The benchmark's forecast of failure when the alert was called: its median, which is put on the early side.
     failure_time: Option<Timestamp>,
     /// Whether it means what it says.
     status: Status,
@@ -214,7 +215,13 @@ impl Alert {
         is_firing.then(|| self.status.marked(recommended))
     }
 
-    fn variables(&self, attempt: u32, link: Option<&str>) -> [(&'static str, String); 16] {
+    /// What a hook gets in its environment; `zone`: in which people at the site live.
+    fn variables(
+        &self,
+        attempt: u32,
+        link: Option<&str>,
+        zone: &TimeZone,
+    ) -> [(&'static str, String); 17] {
         let benchmark = self.event.benchmark.as_ref();
         let count = self.many.as_ref().map_or(1, |many| many.members.len());
         let optional_time = self.failure_time.map(|time| time.to_string());
@@ -242,6 +249,7 @@ impl Alert {
             ),
             ("SLIPWATCH_STATE", state_name(self.state).to_owned()),
             ("SLIPWATCH_RULE", rule),
+            ("SLIPWATCH_TEXT_LOCAL", local(&text, zone)),
             ("SLIPWATCH_TEXT", text),
             ("SLIPWATCH_TIME", self.event.time.to_string()),
             ("SLIPWATCH_FAILURE_TIME", optional_time.unwrap_or_default()),
@@ -328,7 +336,8 @@ pub(super) async fn run_program(
     link: Option<&str>,
 ) -> HookOutcome {
     let run = run_name();
-    let mut child = match start(hook, &alert.variables(attempt, link), &run) {
+    let zone = TimeZone::get(&hook.zone).unwrap_or(TimeZone::UTC);
+    let mut child = match start(hook, &alert.variables(attempt, link, &zone), &run) {
         Ok(child) => child,
         Err(reason) => return HookOutcome::NotStarted(reason),
     };

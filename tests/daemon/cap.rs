@@ -203,6 +203,8 @@ async fn a_message_has_what_the_schema_asks_for_and_any_text_in_it() {
         ordered(info, &OF_INFO);
         assert_eq!(child(info, "severity"), "Extreme");
         assert_eq!(child(info, "responseType"), "Evacuate");
+        // A receiver that leaves out what is possible alone keeps it, as it keeps orange.
+        assert_eq!(child(info, "certainty"), "Likely");
         let mark = match word {
             "Exercise" => "EXERCISE, do not act on this: ",
             "Test" => "TEST, do not act on this: ",

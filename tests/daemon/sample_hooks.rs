@@ -108,7 +108,7 @@ fn an_email_goes_to_each_address_with_the_alert_in_it_and_no_name_forges_a_heade
     );
     for part in [
         "Monte Toc: red called at 5Bcc: all@example.org, 2017-06-06 19:00 CEST\n\nWhat to do: Evacuate the area.\n",
-        "Collapse forecast (median): 2017-06-07 05:00 CEST",
+        "Collapse forecast (median): 2017-06-07 05:00 CEST. It is put on the early side",
         "\nbenchmark 5: red; chance of collapse 57 % within 48 h.\n",
         r#""text": "benchmark 5: red; chance"#,
     ] {
@@ -118,6 +118,26 @@ fn an_email_goes_to_each_address_with_the_alert_in_it_and_no_name_forges_a_heade
     let output = run("email.sh", &to, RED, &[("SENDMAIL", &failing)]);
     assert_eq!(output.status.code(), Some(75), "the daemon tries again");
     assert_eq!(run("email.sh", &[], RED, &[]).status.code(), Some(2));
+}
+
+#[test]
+fn the_text_of_a_message_has_its_times_by_the_clocks_at_the_site() {
+    let folder = tempfile::tempdir().unwrap();
+    let mail = folder.path().join("mail");
+    let mailer = program(
+        folder.path(),
+        &format!("#!/bin/sh\ncat > {}\n", mail.display()),
+    );
+    let local = Path::new("benchmark 5: red since 2017-06-06 18:00 CEST");
+    let more = [("SENDMAIL", &*mailer), ("SLIPWATCH_TEXT_LOCAL", local)];
+    let output = run("email.sh", &["duty@example.org"], RED, &more);
+    assert!(output.status.success(), "{output:?}");
+    let mail = fs::read_to_string(mail).unwrap();
+    assert!(
+        mail.contains("\n\nbenchmark 5: red since 2017-06-06 18:00 CEST.\n"),
+        "{mail}"
+    );
+    assert!(!mail.contains("\nbenchmark 5: red; chance"), "{mail}");
 }
 
 /// Exim takes a message with a longer line, and bounces it.
@@ -202,7 +222,7 @@ fn a_push_message_has_the_priority_of_the_level_and_a_server_that_refuses_it_is_
         let title =
             format!("Title: {mark}{level} {state}: Monte Toc, 5Bcc: all@example.org{beside}\r\n");
         let text = if said.1 == "firing" {
-            "\r\n\r\nEvacuate the area. At 2017-06-06 19:00 CEST; collapse forecast (median) 2017-06-07 05:00 CEST; benchmark 5"
+            "\r\n\r\nEvacuate the area. At 2017-06-06 19:00 CEST; collapse forecast (median, on the early side) 2017-06-07 05:00 CEST; benchmark 5"
         } else {
             "\r\n\r\nThis is no all-clear: somebody has to look at the slope before anyone goes back. At 2017-06-06 19:00 CEST; benchmark 5"
         };

@@ -208,6 +208,19 @@ fn a_red_of_the_past_that_nothing_has_ended_is_called_after_a_first_start_as_of_
     assert!(called > at(30) && called <= at(41), "{called}");
     assert_eq!(late.level(&BenchmarkId::new("a")), Some(Level::Red));
     assert_eq!(late.level(&BenchmarkId::new("b")), Some(Level::Green));
+    // Its figures are those of then, and it says so.
+    let found = past.iter().rev().find_map(|event| {
+        if let EventKind::Alert { rule, text, .. } = &event.kind {
+            (rule == "past").then_some(text)
+        } else {
+            None
+        }
+    });
+    let found = found.unwrap();
+    assert!(
+        found.contains("nothing since has ended it; when it was called: chance of collapse"),
+        "{found}"
+    );
 }
 
 #[test]

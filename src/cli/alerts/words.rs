@@ -41,6 +41,11 @@ pub(super) fn shown(alert: &AlertView, zone: &TimeZone) -> String {
     line("valid until", &valid(alert, &clock));
     let settings = &alert.settings;
     let policy = (alert.benchmark.as_ref()).map_or(&settings.policy, |one| settings.policy(one));
+    let is_in_force = alert.benchmark.is_some() && alert.state == AlertLife::Firing;
+    let ends = policy.end_in_words(alert.level).filter(|_| is_in_force);
+    if let Some(ends) = ends {
+        line("ends when", &ends);
+    }
     line(
         "evacuation",
         &format!(
@@ -144,7 +149,7 @@ fn collapse(failure: &FailureTime, clock: &dyn Fn(Timestamp) -> String) -> Strin
         )
     };
     format!(
-        "time of collapse: 5 % {}, median {}, 95 % {}; {:.1} % within {:.0} days",
+        "time of collapse: 5 % {}, median {} (on the early side: the chance before it may be under one half), 95 % {}; {:.1} % within {:.0} days",
         bound(failure.low),
         bound(failure.median),
         bound(failure.high),

@@ -30,9 +30,9 @@ is printed whenever the level of a measured point changes, with the reason:
            the next reading on, has a chance of {} % or more
   unknown  nothing can be said: no readings, or a sensor at fault
 
-\"74 % in 30 days\" is that chance; at the median date the collapse is as likely
-to come before as after. A level falls only when the slope has slowed down or
-has been steady for long enough.
+\"74 % in 30 days\" is that chance; the median date is put on the early side: the
+chance of a collapse before it may be under one half. A level falls only when
+the slope has slowed down or has been steady for long enough.
 
 Below stand, over the same time, from left to right: the velocity, from the
 slowest to the fastest (logarithmic); the level (. green, y, o, r); the days

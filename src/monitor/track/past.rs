@@ -268,7 +268,10 @@ impl Track {
         });
         let text = format!(
             "{place} since {since}, found in the readings from before it was watched; nothing since has ended it{}",
-            called.unwrap_or_default()
+            called.map_or_else(String::new, |called| format!(
+                "; when it was called: {}",
+                called.trim_start_matches("; ")
+            ))
         );
         let kind = EventKind::Alert {
             level,

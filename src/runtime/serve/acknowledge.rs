@@ -2,7 +2,7 @@
 
 use super::caller::{NO_SUCH_PAGE, OwnNames};
 use super::threads::ORDERS;
-use crate::reading::Timestamp;
+use crate::reading::{clock, local};
 use crate::runtime::link::AskedLink;
 use crate::runtime::view::{AlertLife, AlertView, LinkPage, LinkTarget, SiteReader};
 use crate::store::StoreError;
@@ -151,7 +151,7 @@ fn page_of(page: &LinkPage, zone: &TimeZone) -> PageAnswer {
         LinkPage::Seen(alert) => gone("This alert has been acknowledged", "", Some(alert), zone),
         LinkPage::Over(alert) => over(alert, zone),
         LinkPage::Expired(until) => {
-            let until = local(*until, zone);
+            let until = clock(*until, zone);
             let text = format!("<p>It was good until {until}. {UNCHANGED}</p>");
             (StatusCode::GONE, "This link has expired", text)
         }
@@ -203,34 +203,16 @@ fn described(alert: &AlertView, zone: &TimeZone) -> String {
         escaped(&alert.site),
         alert.level,
         escaped(&place),
-        local(alert.since, zone),
-        escaped(&in_zone(&alert.text, zone)),
+        clock(alert.since, zone),
+        escaped(&local(&alert.text, zone)),
         escaped(alert.recommended),
     );
     if let Some((at, by)) = alert.acknowledged() {
-        let at = at.map_or_else(String::new, |at| format!(" at {}", local(at, zone)));
+        let at = at.map_or_else(String::new, |at| format!(" at {}", clock(at, zone)));
         let by = by.map_or_else(String::new, |by| format!(" by {}", escaped(by)));
         let _ = writeln!(text, "<p>Acknowledged{at}{by}.</p>");
     }
     text
-}
-
-/// A text with its times in the site's zone.
-fn in_zone(text: &str, zone: &TimeZone) -> String {
-    let words = text.split_inclusive([' ', ',', ';']).map(|word| {
-        let bare = word.trim_end_matches([' ', ',', ';']);
-        let time = bare.ends_with('Z').then(|| bare.parse().ok()).flatten();
-        time.map_or_else(
-            || word.to_owned(),
-            |time| local(time, zone) + &word[bare.len()..],
-        )
-    });
-    words.collect()
-}
-
-fn local(time: Timestamp, zone: &TimeZone) -> String {
-    let there = time.to_zoned(zone.clone());
-    there.strftime("%Y-%m-%d %H:%M %Z").to_string()
 }
 
 /// Text as HTML takes it between tags.

@@ -173,7 +173,8 @@ export function collapse(forecast) {
   const main = forecast.median ? [when(forecast.median)] : [`not within ${days} days`];
   const chance = `chance ${percent(forecast.probability)} within ${days} days`;
   const until = forecast.high ? `to ${minute(forecast.high)}` : 'or later';
-  const text = forecast.low ? `90 %: ${minute(forecast.low)} ${until}; ${chance}` : chance;
+  const main_is = forecast.median ? 'median, on the early side; ' : '';
+  const text = forecast.low ? `${main_is}90 %: ${minute(forecast.low)} ${until}; ${chance}` : chance;
   return [...main, el('small', {}, text)];
 }
 
