@@ -4,7 +4,7 @@ use super::args::ReadingArgs;
 use super::exit::{NoSuchReadings, UsageError};
 use super::{explain, picture, replay};
 use crate::alert::Policy;
-use crate::figures::{Replayed, pictures};
+use crate::figures::{self, Replayed};
 use crate::monitor::{Event, Settings};
 use crate::reading::{Recording, Series, Timestamp};
 use anyhow::bail;
@@ -106,9 +106,7 @@ fn residual(args: &Args) -> anyhow::Result<String> {
         &recording,
         &args.readings.policy(&Policy::default()),
     );
-    let found = pictures(&explanation);
-    let picture = found.into_iter().find(|picture| picture.name == "residual");
-    let picture = picture.ok_or_else(|| {
+    let picture = figures::residual(&explanation).ok_or_else(|| {
         let benchmark = &series.benchmark;
         let why = explanation.remarks.first();
         NoSuchReadings(match why {

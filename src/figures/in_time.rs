@@ -122,15 +122,17 @@ pub(super) fn contributions(explanation: &Explanation) -> Option<Picture> {
 /// The posterior of the load that nobody declared, before and after.
 pub(super) fn undeclared_load(explanation: &Explanation) -> Option<Picture> {
     let curves = &explanation.curves;
+    // What is left over after the effects is marked.
+    let left = left_over(&explanation.residual.structure);
     let both = [
-        ("before", &curves.load_before, RED),
-        ("after", &curves.load_after, BLUE),
+        ("before", &curves.load_before, RED, None),
+        ("after", &curves.load_after, BLUE, Some(left)),
     ];
     let edges = |&(mean, sd): &(f64, f64)| [mean - HALF_WIDTH_90 * sd, mean + HALF_WIDTH_90 * sd];
     let all = both.iter().flat_map(|one| one.1.iter().flat_map(edges));
     let y = Axis::around("e-folds of velocity", all);
     let mut panels = Vec::new();
-    for (name, load, colour) in both {
+    for (name, load, colour, left) in both {
         let mean: Vec<f64> = load.iter().map(|one| one.0).collect();
         let Some(middle) = points(explanation, &mean) else {
             continue;
@@ -142,9 +144,7 @@ pub(super) fn undeclared_load(explanation: &Explanation) -> Option<Picture> {
             (day, low, high)
         });
         let mut marks = behind(explanation);
-        if name == "after" {
-            marks.extend(left_over(&explanation.residual.structure));
-        }
+        marks.extend(left.into_iter().flatten());
         let band = Mark::Band {
             points: every_few(band.collect()),
             colour,

@@ -39,6 +39,20 @@ pub fn pictures(explanation: &Explanation) -> Vec<Picture> {
     all.into_iter().flatten().collect()
 }
 
+/// The residual alone, where there is one.
+pub fn residual(explanation: &Explanation) -> Option<Picture> {
+    in_time::residual(explanation)
+}
+
+/// The residual, and what each effect adds, those left out for which there are no numbers.
+pub fn of_the_loop(explanation: &Explanation) -> Vec<Picture> {
+    let both = [
+        in_time::residual(explanation),
+        in_time::contributions(explanation),
+    ];
+    both.into_iter().flatten().collect()
+}
+
 /// What was tried, on one line: its kind, channel, form and time.
 pub fn title(candidate: &Candidate) -> String {
     let channel = candidate.channel.clone();

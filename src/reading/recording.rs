@@ -85,6 +85,12 @@ fn listed(names: &[String]) -> String {
 }
 
 impl Recording {
+    /// What the recording is where it was never measured, by its own metadata: "a reconstruction of ...".
+    pub fn reconstruction(&self) -> Option<&str> {
+        let kind = self.provenance.get("kind").map(String::as_str);
+        kind.filter(|kind| kind.contains("reconstruction"))
+    }
+
     /// Joins files in the order given: the rows of one quantity of one benchmark become one
     /// series, in the unit of the first, and where two files disagree about a time the later file stands. Overlaps are
     /// counted; the order of the files is not disorder.

@@ -6,7 +6,8 @@ use crate::monitor::{
 };
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::TOLERANCE;
-use crate::store::{Store, StoreError};
+use crate::runtime::hook::{MessageState, state_name};
+use crate::store::{AlertIdentity, Store, StoreError};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
@@ -373,11 +374,19 @@ pub fn silence_of_the_site(
 pub fn closed(store: &Store, in_force: &InForce) -> Result<Vec<Event>, StoreError> {
     let mut found = Vec::new();
     for [hook, closed_key, closed_level, state] in store.closed_deliveries()? {
-        let is_it = |event: &&Event| {
-            matches!(&event.kind, EventKind::Alert { key, level, .. }
-                if *key == closed_key && level.name() == closed_level)
+        let delivered = AlertIdentity {
+            key: &closed_key,
+            level: &closed_level,
+            state: &state,
         };
-        let Some(alert) = in_force.values().find(is_it).filter(|_| state == "firing") else {
+        let is_it = |event: &&Event| {
+            matches!(&event.kind, EventKind::Alert { key, level, .. } if delivered == AlertIdentity {
+                key,
+                level: level.name(),
+                state: state_name(MessageState::Firing),
+            })
+        };
+        let Some(alert) = in_force.values().find(is_it) else {
             continue;
         };
         found.push(Event {

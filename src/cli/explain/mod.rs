@@ -178,11 +178,9 @@ fn cut(recording: &mut Recording, from: Option<Timestamp>, until: Option<Timesta
 
 /// What a recording that was never measured must have said of it.
 fn remark_on_origin(recording: &Recording) -> Option<String> {
-    let said = |key: &str| recording.provenance.get(key).map(String::as_str);
-    if !said("kind")?.contains("reconstruction") {
-        return None;
-    }
-    let title = said("title").map_or(String::new(), |title| format!(" ({title})"));
+    recording.reconstruction()?;
+    let title = recording.provenance.get("title");
+    let title = title.map_or(String::new(), |title| format!(" ({title})"));
     Some(format!(
         "These readings are a reconstruction, not measured{title}."
     ))

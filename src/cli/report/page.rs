@@ -35,8 +35,7 @@ pub(super) fn page(args: &Args, material: &Material) -> anyhow::Result<String> {
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n\
          <title>{title}</title>\n<style>{STYLE}{PRINT}</style>\n</head>\n<body>\n<h1>{title}</h1>\n",
     );
-    let kind = material.recording.provenance.get("kind");
-    if let Some(kind) = kind.filter(|kind| kind.contains("reconstruction")) {
+    if let Some(kind) = material.recording.reconstruction() {
         // Writing to a string cannot fail.
         let _ = writeln!(
             out,

@@ -68,7 +68,7 @@ pub(super) fn summary(material: &Material, series: &Series) -> String {
         } else {
             write!(
                 out,
-                "; collapse forecast {} (90 %: {} to {}; chance {chance} in {days:.0} days)",
+                "; collapse forecast {} (median, on the early side; 90 %: {} to {}; chance {chance} in {days:.0} days)",
                 at(failure.median),
                 at(failure.low),
                 at(failure.high),
@@ -193,15 +193,13 @@ pub(super) fn levels(args: &Args, material: &Material, series: &Series) -> TextT
 pub(super) fn closing_the_loop(material: &Material, series: &Series) -> String {
     let explanation = explain::quick(series, &material.recording, &material.policy);
     let mut out = explain::part(&explanation);
-    for picture in figures::pictures(&explanation) {
-        if matches!(picture.name, "residual" | "contributions") {
-            let _ = write!(
-                out,
-                "<figure>\n{}<figcaption>{}</figcaption>\n</figure>\n",
-                picture.svg,
-                escaped(&picture.caption)
-            );
-        }
+    for picture in figures::of_the_loop(&explanation) {
+        let _ = write!(
+            out,
+            "<figure>\n{}<figcaption>{}</figcaption>\n</figure>\n",
+            picture.svg,
+            escaped(&picture.caption)
+        );
     }
     out
 }
