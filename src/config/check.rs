@@ -249,7 +249,7 @@ fn levels_without_hook(config: &Config) -> Vec<String> {
 fn benchmarks_without_hook(config: &Config) -> Option<String> {
     const MOST_NAMED: usize = 5;
     let asks = |hook: &&HookConfig| hook.levels.contains(&Level::Red);
-    let mut of_one = config.hooks.iter().filter(asks).filter(|hook| !hook.site);
+    let of_one = config.hooks.iter().filter(asks).filter(|hook| !hook.site);
     if of_one.clone().any(|hook| hook.benchmarks.is_empty()) {
         return None;
     }
@@ -261,7 +261,7 @@ fn benchmarks_without_hook(config: &Config) -> Option<String> {
         ));
     }
     let named = config.benchmarks.iter().map(|benchmark| &benchmark.id);
-    let mut missed = named.filter(|id| !of_one.any(|hook| hook.benchmarks.contains(*id)));
+    let mut missed = named.filter(|id| !of_one.clone().any(|hook| hook.benchmarks.contains(*id)));
     let first: Vec<String> = (missed.by_ref().take(MOST_NAMED))
         .map(ToString::to_string)
         .collect();

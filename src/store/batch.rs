@@ -156,6 +156,19 @@ impl Store {
         let written = inner.write(batch);
         inner.committed(batch.steps.len() + batch.events.len(), written)
     }
+
+    /// Keeps the monitor's memory as of an earlier `step`.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn save_memory(&self, parts: &[MemoryPart], step: i64) -> Result<(), StoreError> {
+        let mut inner = self.inner();
+        let immediate = rusqlite::TransactionBehavior::Immediate;
+        let transaction = inner.connection.transaction_with_behavior(immediate)?;
+        write_memory(&transaction, parts, step)?;
+        transaction.commit()?;
+        Ok(())
+    }
 }
 
 impl Inner {

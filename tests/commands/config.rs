@@ -137,6 +137,42 @@ fn check_doubts_two_hooks_that_run_the_same_for_the_same_alerts() {
 }
 
 #[test]
+fn two_hooks_whose_command_lines_read_the_same_are_refused() {
+    let other = |run: &str| format!("{RIGHT}[[hook]]\nrun = [{run}]\n");
+    let text =
+        other("\"./notify.sh\", \"a b\"") + "[[hook]]\nrun = [\"./notify.sh\", \"a\", \"b\"]\n";
+    let said = problems(&text).join("\n");
+    assert!(said.contains("named \"./notify.sh a b\""), "{said}");
+    config::parse(
+        &other("\"./notify.sh\", \"a\", \"b\""),
+        Path::new("site.toml"),
+    )
+    .unwrap();
+}
+
+#[test]
+fn check_names_benchmarks_whose_own_red_reaches_nobody() {
+    let doubts = |hooks: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("site.toml");
+        let (of_site, _) = RIGHT.split_once("[[hook]]").unwrap();
+        let benchmarks = ["P1", "P2", "P3"].map(|id| format!("[[benchmark]]\nid = \"{id}\"\n"));
+        std::fs::write(&file, format!("{of_site}{hooks}{}", benchmarks.concat())).unwrap();
+        config::check(&file).unwrap().warnings.join("\n")
+    };
+    let hook = |more: &str| format!("[[hook]]\nrun = [\"./notify.sh\"]\n{more}\n");
+    let said = doubts(&hook("benchmarks = [\"P1\"]"));
+    assert!(
+        said.contains("asks for P2, P3: nobody is notified of their red"),
+        "{said}"
+    );
+    let said = doubts(&hook("site = true"));
+    assert!(said.contains("no hook of the red of a benchmark"), "{said}");
+    let said = doubts(&(hook("site = true") + "[[hook]]\nrun = [\"./other.sh\"]\n"));
+    assert!(!said.contains("nobody is notified of"), "{said}");
+}
+
+#[test]
 fn a_link_that_nobody_could_follow_is_refused() {
     let said = |lines: &str| {
         let text = RIGHT.replace("name =", &format!("{lines}\nname ="));

@@ -189,6 +189,43 @@ fn a_flipped_bit_in_the_memory_or_a_position_is_seen_and_both_are_made_anew() {
     assert!(site.proven_events().starts_with(&before));
 }
 
+/// All of a long record is judged again where the memory cannot be used: a stop on the way loses little of that.
+#[test]
+fn what_has_been_judged_again_is_saved_on_the_way_and_a_kill_does_not_begin_it_anew() {
+    let site = used();
+    let start = jiff::Timestamp::from_second(1_577_836_800).unwrap();
+    let row = |row: i64| {
+        let time =
+            start + jiff::SignedDuration::from_hours(200) + jiff::SignedDuration::from_mins(row);
+        format!("{time},{}\n", 200.0 + 0.016 * row as f64)
+    };
+    let running = site.caught_up();
+    site.append("incoming/5.csv", &(1..=2600).map(row).collect::<String>());
+    eventually("all readings", || site.values().len() == 2800);
+    running.stop();
+    let database = Connection::open(site.path("state/slipwatch.db")).unwrap();
+    database
+        .execute_batch("DELETE FROM memory; DELETE FROM meta WHERE name = 'memory_step'")
+        .unwrap();
+    drop(database);
+    fs::write(site.path("log"), "").unwrap();
+    let again = site.start(&[]);
+    eventually("a part of it", || {
+        site.log().contains("judged again so far: saved")
+    });
+    // Killed.
+    drop(again);
+    let database = Connection::open(site.path("state/slipwatch.db")).unwrap();
+    let step = "SELECT value FROM meta WHERE name = 'memory_step'";
+    let step: i64 = database.query_row(step, [], |row| row.get(0)).unwrap();
+    assert!(step >= 2000, "{step}");
+    drop(database);
+    let before = site.proven_events();
+    site.caught_up().stop();
+    assert_eq!(site.values().len(), 2800, "taken twice");
+    assert!(site.proven_events().starts_with(&before));
+}
+
 #[test]
 fn a_flipped_bit_in_what_hooks_are_to_be_sent_is_seen_at_the_next_start() {
     let site = Site::new("");

@@ -169,6 +169,15 @@ impl Site {
                 // Before the next step: it may be an order that concerns them.
                 self.stand_again(store)?;
             }
+            // Where all of them are judged again, because what was saved cannot be read, a stop on the way must not begin it anew.
+            if let Some(parts) = self.memory() {
+                store.save_memory(&parts, after)?;
+                self.steps_since_memory = 0;
+                tracing::info!(
+                    step = after,
+                    "as far as stored steps have been judged again is saved"
+                );
+            }
         }
         tracing::info!(steps = after - from, of = after, "stored steps replayed");
         self.settings = self.monitor.settings().clone();
