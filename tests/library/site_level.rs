@@ -141,8 +141,8 @@ fn where_fewer_can_be_judged_than_the_rule_asks_for_all_of_those_make_the_site()
 
 #[test]
 fn benchmarks_that_have_never_read_are_waited_for_and_then_those_that_read_make_the_site() {
-    // b can be judged and is not red.
-    assert_eq!(first_day_of_three(&["a", "b"], 25), (false, None));
+    // b can be judged and is not red, until nothing can be said of it either: after a day without another reading.
+    assert_eq!(first_day_of_three(&["a", "b"], 25), (false, Some(25)));
     // Nothing can be said of b and c: at once of the site, and from the end of the wait on a makes its level.
     assert_eq!(first_day_of_three(&["a"], 25), (true, Some(25)));
     // Where there was no data time before, the first reading begins the wait.

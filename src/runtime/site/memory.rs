@@ -170,13 +170,18 @@ impl Site {
                 self.stand_again(store)?;
             }
             // Where all of them are judged again, because what was saved cannot be read, a stop on the way must not begin it anew.
-            if let Some(parts) = self.memory() {
-                store.save_memory(&parts, after)?;
+            if self.steps_since_memory >= STEPS_A_MEMORY
+                && let Some(parts) = self.memory_now()
+            {
                 self.steps_since_memory = 0;
-                tracing::info!(
-                    step = after,
-                    "as far as stored steps have been judged again is saved"
-                );
+                match store.save_memory(&parts, after) {
+                    Ok(()) => {
+                        tracing::info!(step = after, "stored steps judged again so far: saved")
+                    }
+                    Err(error) => {
+                        tracing::warn!(%error, "stored steps judged again so far: not saved")
+                    }
+                }
             }
         }
         tracing::info!(steps = after - from, of = after, "stored steps replayed");
@@ -354,9 +359,11 @@ impl Site {
         if self.monitor.reads_past() || self.monitor.queues() {
             many *= STEPS_UNJUDGED;
         }
-        if self.steps_since_memory < many {
-            return None;
-        }
+        (self.steps_since_memory >= many).then(|| self.memory_now())?
+    }
+
+    /// The memory as of the last step.
+    fn memory_now(&self) -> Option<Vec<MemoryPart>> {
         let (newest, ahead, read_anew) = self.read.to_remember();
         let (mutes, put_off) = self.mutes.to_remember();
         let own = SiteMemory {
