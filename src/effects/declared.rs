@@ -49,7 +49,7 @@ pub fn explain_given(
     };
     let channels: Vec<Channel> = channels.iter().filter(is_named).cloned().collect();
     let mut given = Vec::new();
-    let look = |cleaned: &Series, channels: &[Channel], is_drawn| {
+    let look = |cleaned: &Series, channels: &[Channel], is_drawn: bool| {
         let mut remarks = Vec::new();
         let ready = Ready::of(cleaned, channels, &mut remarks);
         let refused = ready

@@ -2,8 +2,9 @@
 
 use super::channels::{ChannelCopy, distinct};
 use super::daily::{self, has_daily_tide};
-use super::explanation::{Candidate, Effect, Explained, Explanation, SettingsReport};
+use super::explanation::{Candidate, Effect, Explained, Explanation, Fault, SettingsReport};
 use super::faults::inspect;
+use super::filled::has_gaps;
 use super::findings::{Findings, findings};
 use super::forms;
 use super::kind::{FaultKind, Kind};
@@ -13,16 +14,24 @@ use super::own_event::parted_by;
 use super::partition::partition_candidate;
 use super::ready::Ready;
 use super::remarks;
-use super::search::Withheld;
+use super::search::{SearchResult, Withheld};
 use super::term::Scratch;
 use super::upslope;
 use super::verdict::conclude;
 use crate::reading::{Channel, Series, Timestamp};
 use fnv::FnvHasher;
+use std::collections::BTreeSet;
 use std::hash::Hasher as _;
+
+/// Said where a gauge that acts has gaps while the readings went on.
+const FILLED: &str = "What fell while the gauge had no values is fitted to the readings with all else: it is no evidence of the rain, and what happened there besides is not seen.";
+const NOT_FILLED: &str = "While a covariate in the law has no values the usual one stands in for it: its size and its delay are less certain than their intervals say.";
 
 /// Said of a record with which nothing can be tried.
 pub const TOO_FEW: &str = "There are too few readings to distinguish anything from noise.";
+
+/// So often at most a search is made again without the outliers that stand out of the law that the one before came to.
+const LOOKED_AGAIN: usize = 2;
 
 /// Explains `series` by what its law lacks, from `channels` beside it; `neighbours` are the other
 /// benchmarks of the slope. `progress` is called with the share done, 0 to 1.
@@ -48,7 +57,7 @@ pub(super) fn explained_by(
     series: &Series,
     channels: &[Channel],
     options: &Options,
-    look: impl FnOnce(&Series, &[Channel], bool) -> (Findings, Vec<String>),
+    mut look: impl FnMut(&Series, &[Channel], bool) -> (Findings, Vec<String>),
 ) -> Explanation {
     let data_hash = hash(series, channels);
     let (first, last) = (series.readings.first(), series.readings.last());
@@ -57,24 +66,26 @@ pub(super) fn explained_by(
         last.map(|reading| reading.time),
         series.readings.len(),
     );
-    let inspected = inspect(series, channels);
+    let mut inspected = inspect(series, channels);
     let faulty = inspected.faults.iter().filter_map(|f| f.channel.clone());
-    let (channels, mut copies) = distinct(inspected.channels, &faulty.collect::<Vec<_>>());
-    // Of these two it is said already.
-    copies.retain(|one| {
-        let are_these = |(a, b): &(String, String)| {
-            [a, b]
-                .iter()
-                .all(|name| **name == one.copy || **name == one.of)
-        };
-        !inspected.twins.iter().any(are_these)
-    });
-    let (series, channels) = (&inspected.series, channels.as_slice());
-    let is_drawn = inspected
-        .faults
-        .iter()
-        .any(|fault| fault.kind == FaultKind::Interpolated && fault.channel.is_none());
-    let (mut findings, of_search) = look(series, channels, is_drawn);
+    let (channels, mut copies) = distinct(
+        std::mem::take(&mut inspected.channels),
+        &faulty.collect::<Vec<_>>(),
+    );
+    copies.retain(|one| !is_said_of(one, &inspected.twins));
+    let channels = channels.as_slice();
+    let is_interpolated =
+        |one: &Fault| one.kind == FaultKind::Interpolated && one.channel.is_none();
+    let is_drawn = inspected.faults.iter().any(is_interpolated);
+    let (mut findings, mut of_search) = look(&inspected.series, channels, is_drawn);
+    for _ in 0..LOOKED_AGAIN {
+        let residual = findings.curves.residual();
+        if is_drawn || !inspected.take_out_beside_a_law(residual, findings.effects()) {
+            break;
+        }
+        (findings, of_search) = look(&inspected.series, channels, is_drawn);
+    }
+    let series = &inspected.series;
     if inspected.is_newest_left_out && findings.verdict.effect == Kind::NONE {
         // The newest reading may be the beginning of a motion: that is not nothing.
         findings.verdict = Effect::of(Kind::UNEXPLAINED);
@@ -119,6 +130,16 @@ pub(super) fn explained_by(
         curves: findings.curves,
         known_load: findings.known_load,
     }
+}
+
+/// Whether it is said already that these two channels are alike.
+fn is_said_of(one: &ChannelCopy, twins: &[(String, String)]) -> bool {
+    let are_these = |(a, b): &(String, String)| {
+        [a, b]
+            .iter()
+            .all(|name| **name == one.copy || **name == one.of)
+    };
+    twins.iter().any(are_these)
 }
 
 /// What the proportions of the benchmarks show of a partition, made good by what the law shows of this one: where they do
@@ -185,7 +206,7 @@ fn look(
     let mut scratch = Scratch::default();
     let mut remarks = Vec::new();
     let none = Findings::none(series.unit);
-    let Some(ready) = Ready::of(series, channels, &mut remarks) else {
+    let Some(mut ready) = Ready::of(series, channels, &mut remarks) else {
         remarks.push(TOO_FEW.to_owned());
         return (none, remarks);
     };
@@ -197,6 +218,18 @@ fn look(
     let Some(mut found) = search.run(ready.plain.clone(), progress) else {
         return (none, remarks);
     };
+    if let Some((filled, better)) = with_gaps_filled(&ready, &found, (is_drawn, options), progress)
+    {
+        (ready, found) = (filled, better);
+        remarks.push(FILLED.to_owned());
+    } else if found
+        .full
+        .terms
+        .iter()
+        .any(|term| has_gaps(&ready.problem, &ready.drivers, term))
+    {
+        remarks.push(NOT_FILLED.to_owned());
+    }
     let verdict = conclude(&ready, &mut found, options, &mut scratch);
     let withheld = found.withheld;
     if found.is_daily {
@@ -211,6 +244,29 @@ fn look(
     }
     remarks.extend(withheld.map(|best| best.remark()));
     (without_conclusions(findings, withheld.is_some()), remarks)
+}
+
+/// The search made again with what fell in the gaps of a gauge as the law that was found fits it, where that is better by the margin and comes to the
+/// same covariates.
+fn with_gaps_filled(
+    ready: &Ready,
+    found: &SearchResult,
+    (is_drawn, options): (bool, &Options),
+    progress: &mut dyn FnMut(f64),
+) -> Option<(Ready, SearchResult)> {
+    let drivers = ready.search(options, is_drawn).filled(&found.full)?;
+    let filled = Ready {
+        drivers,
+        ..ready.clone()
+    };
+    let search = filled.search(options, is_drawn);
+    let better = search.run(filled.plain.clone(), progress)?;
+    let channels = |of: &SearchResult| -> BTreeSet<usize> {
+        let each = of.full.terms.iter();
+        each.filter_map(|term| term.channel).collect()
+    };
+    let has_all = channels(&better).is_superset(&channels(found));
+    has_all.then_some((filled, better))
 }
 
 /// Of values that are not raw readings no noise is concluded, nor that nothing is there where something was withheld.

@@ -346,3 +346,11 @@ pub struct Curves {
     /// What each effect adds to the log-load, where it acts there.
     pub log_loads: BTreeMap<String, Vec<f64>>,
 }
+
+impl Curves {
+    /// The readings less the law under the known load.
+    pub(super) fn residual(&self) -> Vec<f64> {
+        let both = self.readings.iter().zip(&self.after);
+        both.map(|(reading, after)| reading - after).collect()
+    }
+}

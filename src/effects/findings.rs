@@ -154,11 +154,11 @@ fn noise_report(full: &Fitted, unit: Unit) -> NoiseReport {
     NoiseReport {
         white: full.sigma / factor,
         correlated: if remembers {
-            noise.ratio * full.sigma / factor
+            noise.remembered() * full.sigma / factor
         } else {
             0.0
         },
-        memory_days: (remembers && noise.days.is_finite()).then_some(noise.days),
+        memory_days: noise.memory_days().filter(|_| remembers),
     }
 }
 

@@ -101,7 +101,7 @@ impl Search<'_> {
     }
 
     /// The same with the term of one index at another.
-    fn with_term_moved(&self, fitted: &Fitted, from: usize, to: usize) -> Fitted {
+    pub(super) fn with_term_moved(&self, fitted: &Fitted, from: usize, to: usize) -> Fitted {
         let mut moved = fitted.clone();
         let own = coefficients_of(self.problem, &moved.terms, from);
         let own: Vec<f64> = moved.parameters.drain(own).collect();

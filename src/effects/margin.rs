@@ -2,9 +2,10 @@
 
 use super::candidates::is_one_wave;
 use super::definition::{Support, Trying};
-use super::judge::objection;
+use super::judge::{named, objection};
 use super::noise::Memory;
 use super::objection::{Objection, ObjectionWeight};
+use super::refit::Fitted;
 use super::search::{DeclaredPart, Refitted, SIGNIFICANT, Search};
 use super::slip_alike::may_be_slip;
 
@@ -43,7 +44,7 @@ impl Search<'_> {
             return Some(why.into());
         }
         let (problem, fitted, drivers) = (self.problem, &one.fitted, self.drivers);
-        let by_physics = || objection(problem, fitted, drivers);
+        let by_physics = || self.objection_to_any(fitted);
         let may_have_acted = |why| Objection {
             why,
             weight: ObjectionWeight::MayHaveActed,
@@ -65,6 +66,20 @@ impl Search<'_> {
             let is_open = self.declared == DeclaredPart::Nothing;
             let slip = is_open.then(|| may_be_slip(problem, fitted, drivers))?;
             slip.map(may_have_acted)
+        })
+    }
+
+    /// Why the newest term, or one before it now that it is there, is not what the physics allow; `None` if all are.
+    fn objection_to_any(&self, fitted: &Fitted) -> Option<String> {
+        let (problem, drivers) = (self.problem, self.drivers);
+        let to_newest = objection(problem, fitted, drivers);
+        let last = fitted.terms.len().saturating_sub(1);
+        to_newest.or_else(|| {
+            (0..last).find_map(|index| {
+                let why = objection(problem, &self.with_term_moved(fitted, index, last), drivers)?;
+                let name = named(&fitted.terms[index], drivers);
+                Some(format!("beside it {name} is not what it may be: {why}"))
+            })
         })
     }
 

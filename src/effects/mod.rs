@@ -2,6 +2,7 @@
 
 mod act;
 mod backward;
+mod beside;
 mod blur;
 mod by_clock;
 mod calendar;
@@ -17,6 +18,7 @@ mod diagnosis;
 mod explain;
 mod explanation;
 mod faults;
+mod filled;
 mod findings;
 mod forms;
 mod frame;

@@ -1,6 +1,7 @@
 //! Two effects at once. Where a law lacks two, either alone may bend it so that the later block is predicted worse, and neither would
 //! ever be accepted: what the readings refuse of the first for that reason alone is tried with a second beside it.
 
+use super::beside::BESIDE;
 use super::judge::{Compared, held_out, step_errors};
 use super::objection::Judgement;
 use super::refit::Fitted;
@@ -36,6 +37,15 @@ impl Search<'_> {
         let (first, _) = refused.max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))?;
         let mut beside = self.refits(&first.fitted, round)?;
         beside.retain(|one| self.refused_at_once(one).is_none());
+        let jumps: Vec<usize> = (standing.iter())
+            .filter(|one| one.term.is_jump_of_reading())
+            .filter_map(|one| one.term.at)
+            .collect();
+        let is_at_a_jump = |one: &Refitted| is_event_at_one(one, &jumps);
+        if is_at_a_jump(first) {
+            return None;
+        }
+        beside.retain(|one| !is_at_a_jump(one));
         beside.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         beside.truncate(MOST_SECOND);
         let (gain, p_value) = (first.gain, first.p_value);
@@ -56,8 +66,18 @@ impl Search<'_> {
                     let reason = objection.as_ref().map(|objection| objection.why.clone());
                     self.note(&one.term, one, *held, reason);
                 }
-                for term in &both.fitted.terms[base.terms.len()..] {
-                    self.note(term, &both, held, None);
+                // Each is noted with what it gains itself.
+                let terms = &both.fitted.terms[base.terms.len()..];
+                for (term, (gain, p_value)) in terms.iter().zip(shares) {
+                    let fitted = both.fitted.clone();
+                    let one = Refitted {
+                        gain,
+                        p_value,
+                        fitted,
+                        term: term.clone(),
+                        ..both
+                    };
+                    self.note(term, &one, held, None);
                 }
                 let shares = shares.map(|(bic_gain, p_value)| Accepted {
                     bic_gain,
@@ -108,4 +128,13 @@ impl Search<'_> {
         let falls = |(before, after): (f64, f64)| after <= before;
         by_steps && falls(held.errors(self.problem)) && falls(held.errors_of_changes(self.problem))
     }
+}
+
+/// Whether it is an event of the ground where the reading may have jumped, at one of `jumps`: two effects may look like that.
+fn is_event_at_one(one: &Refitted, jumps: &[usize]) -> bool {
+    let of_ground = one
+        .term
+        .at
+        .filter(|_| one.term.kind.is_event_of_the_ground());
+    of_ground.is_some_and(|at| jumps.iter().any(|jump| jump.abs_diff(at) <= BESIDE))
 }

@@ -11,7 +11,7 @@ use super::term::Scratch;
 use crate::reading::{Channel, Series, Unit};
 
 /// All that a search rests on.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Ready {
     pub(super) problem: Problem,
     pub(super) drivers: Vec<Driver>,

@@ -1,5 +1,7 @@
 //! What a covariate does to the slope after a while: its exponential or gamma response, by level or by rate.
 
+mod changed;
+
 use super::act::{mean_and_deviation, standardise};
 use super::kind::Form;
 use crate::reading::{Channel, CovariateKind, DAYS_PER_YEAR, RunningTotal, Timestamp, days_since};

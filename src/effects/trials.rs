@@ -54,7 +54,10 @@ pub(super) fn shortlist(frames: &Frames) -> Vec<Whitener> {
         let best = best.whitener.noise;
         for frame in &frames.each {
             let noise = frame.whitener.noise;
-            let alike = noise.memory == memory && noise.days.total_cmp(&best.days).is_eq();
+            let same = |one: f64, other: f64| one.total_cmp(&other).is_eq();
+            let alike = noise.memory == memory
+                && same(noise.days, best.days)
+                && same(noise.longer, best.longer);
             if alike && noise.ratio <= best.ratio {
                 list.push(frame.whitener.clone());
             }

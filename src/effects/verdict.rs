@@ -339,8 +339,8 @@ fn refuse(candidates: &mut [Candidate], problem: &Problem, term: &Term) {
 fn correlated(unit: Unit, full: &Fitted, bic_gain: f64) -> Effect {
     let noise = full.noise;
     Effect {
-        memory_days: noise.days.is_finite().then_some(noise.days),
-        size: Some(noise.ratio * full.sigma / unit.factor()),
+        memory_days: noise.memory_days(),
+        size: Some(noise.remembered() * full.sigma / unit.factor()),
         unit: Some(unit.to_string()),
         bic_gain,
         ..Effect::of(Kind::CORRELATED_NOISE)

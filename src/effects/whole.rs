@@ -9,6 +9,9 @@ use super::refit::Fitted;
 use super::search::{Accepted, Search};
 use super::term::{Scratch, Term};
 
+/// What grows by no more than this factor has not grown.
+const GROWN: f64 = 1.005;
+
 /// The errors over a later block, mm or mm/day.
 #[derive(Debug, Clone, Copy)]
 struct BlockErrors {
@@ -66,12 +69,11 @@ impl Whole {
         })
     }
 
-    /// Whether the readings of the block are predicted worse with the effects than without any, each from those before it, and no better over all
-    /// of it. From reading to reading a law with many readings between its bends is as good as any, and its noise decides.
+    /// Whether the readings of the block are predicted worse with the effects than without any, each from those before it: clearly, or a little and
+    /// no better over all of it. From reading to reading a law with many readings between its bends is as good as any, and its noise decides.
     fn is_worse(&self, problem: &Problem) -> bool {
-        self.after > self.before
-            && !self.extrapolates_nearer
-            && StepErrors::is_a_figure(problem, self.before)
+        let is_clear = self.after > GROWN * self.before || !self.extrapolates_nearer;
+        self.after > self.before && is_clear && StepErrors::is_a_figure(problem, self.before)
     }
 }
 

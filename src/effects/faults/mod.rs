@@ -4,6 +4,7 @@
 //! copied rows, stuck values, outliers, resets of covariates; and last whether what is left is any
 //! instrument's. A jump of the benchmark's own reading is left in it: that is an effect (`offset`).
 
+mod after_law;
 mod codes;
 mod copies;
 mod nature;

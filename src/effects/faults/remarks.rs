@@ -107,6 +107,16 @@ pub(super) fn of_newest(at: Timestamp, off: f64, unit: Unit) -> String {
     )
 }
 
+/// That these readings stand out of a law with what was found, and out of no neighbours.
+pub(super) fn beside_a_law(faults: &[&Fault]) -> String {
+    let values: usize = faults.iter().map(|fault| fault.values).sum();
+    let what = counted(values, "value far", "values far");
+    let listed = listed(faults);
+    format!(
+        "The readings: {what} from the law with all that was found, and back again ({listed}), taken out; it was fitted again without."
+    )
+}
+
 /// The first few faults, each with its size and date.
 fn listed(faults: &[&Fault]) -> String {
     let first = faults.iter().take(LISTED).map(|fault| instance(fault));

@@ -1,27 +1,27 @@
 //! What the remembering part of a noise is expected to have been, by all readings: the smoother of the two states.
 
-use super::{Covariance, Whitener, advance, since_last, transition, update};
+use super::{
+    Covariance, StateTransition, Whitener, advance, since_last, stationary, transition, update,
+};
 use crate::effects::problem::Problem;
 
 impl Whitener {
     /// Posterior (mean, variance) of what remembers, at every fitted reading, for a column in units of the white noise.
     pub(in crate::effects) fn smooth(&self, problem: &Problem, column: &[f64]) -> Vec<(f64, f64)> {
-        let stationary = f64::from(u8::from(self.noise.days.is_finite()));
-        let (mut mean, mut p): ([f64; 2], Covariance) = ([0.0; 2], [0.0, 0.0, stationary]);
+        let (mut mean, mut p) = ([0.0; 2], stationary(self.noise));
         let mut path = Vec::with_capacity(self.steps.len());
         let typical = problem.typical_velocity();
         for (i, step) in self.steps.iter().enumerate() {
             let dt = since_last(problem, i);
-            let (gather, decay, q) = transition(problem, self.noise, dt, problem.seen[i] / typical);
-            let ahead = [mean[0] + gather * mean[1], decay * mean[1]];
-            let p_ahead = advance(p, gather, decay, q);
+            let (passage, q) = transition(problem, self.noise, dt, problem.seen[i] / typical);
+            let ahead: [f64; 2] = passage.on(mean[0], mean[1]).into();
+            let p_ahead = advance(p, passage, q);
             let (gain, _, after) = update(p_ahead, step.reads);
             let off = column[i] * step.weight - step.reads[0] * ahead[0] - step.reads[1] * ahead[1];
             mean = [ahead[0] + gain[0] * off, ahead[1] + gain[1] * off];
             p = after;
             path.push(SmootherStep {
-                gather,
-                decay,
+                passage,
                 ahead: TwoStates {
                     mean: ahead,
                     covariance: p_ahead,
@@ -45,8 +45,7 @@ struct TwoStates {
 
 /// One reading in the filter: how the states come to it, and as they are expected before and after it.
 struct SmootherStep {
-    gather: f64,
-    decay: f64,
+    passage: StateTransition,
     ahead: TwoStates,
     after: TwoStates,
 }
@@ -69,7 +68,11 @@ fn backwards(path: &[SmootherStep]) -> Vec<(f64, f64)> {
 fn smooth_pair(before: TwoStates, next: &SmootherStep, later: TwoStates) -> TwoStates {
     let (mean, p) = (before.mean, before.covariance);
     let (ahead, p_ahead) = (next.ahead.mean, next.ahead.covariance);
-    let (gather, decay) = (next.gather, next.decay);
+    let StateTransition {
+        keep,
+        gather,
+        decay,
+    } = next.passage;
     let (m_later, v_later) = (later.mean, later.covariance);
     let determinant = p_ahead[0] * p_ahead[2] - p_ahead[1] * p_ahead[1];
     if determinant <= 1e-12 * p_ahead[0].max(1e-12) * p_ahead[2] {
@@ -89,10 +92,10 @@ fn smooth_pair(before: TwoStates, next: &SmootherStep, later: TwoStates) -> TwoS
         -p_ahead[1] / determinant,
         p_ahead[0] / determinant,
     ];
-    // P F', F = [[1, gather], [0, decay]].
+    // P F', F = [[keep, gather], [0, decay]].
     let pf = [
-        [p[0] + gather * p[1], decay * p[1]],
-        [p[1] + gather * p[2], decay * p[2]],
+        [keep * p[0] + gather * p[1], decay * p[1]],
+        [keep * p[1] + gather * p[2], decay * p[2]],
     ];
     let row = |r: [f64; 2]| {
         [

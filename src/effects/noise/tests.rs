@@ -18,9 +18,18 @@ fn drawn(problem: &Problem, noise: Noise, seed: u64) -> (Vec<f64>, Vec<f64>) {
         state = 0.0;
     }
     let mut gathered = 0.0;
+    let mut longer = if noise.longer > 0.0 {
+        normals(&mut random, 1)[0]
+    } else {
+        0.0
+    };
     let (mut readings, mut states) = (Vec::new(), Vec::new());
     for (i, white) in white.into_iter().enumerate() {
         let dt = problem.t[i] - problem.t[i.saturating_sub(1)];
+        if noise.longer > 0.0 {
+            let decay = (-dt / noise.longer).exp();
+            longer = decay * longer + (1.0 - decay * decay).sqrt() * normals(&mut random, 1)[0];
+        }
         for step in normals(&mut random, if i > 0 { SUBSTEPS } else { 0 }) {
             let h = dt / SUBSTEPS as f64;
             let decay = (-h / noise.days).exp();
@@ -35,7 +44,7 @@ fn drawn(problem: &Problem, noise: Noise, seed: u64) -> (Vec<f64>, Vec<f64>) {
         let remembered = match (noise.memory, problem.quantity) {
             (Memory::None, _) => 0.0,
             (Memory::Load, Quantity::Displacement) => gathered,
-            _ => state,
+            _ => state + longer,
         };
         readings.push(problem.weight[i] * white + noise.ratio * remembered);
         states.push(state);
@@ -44,16 +53,18 @@ fn drawn(problem: &Problem, noise: Noise, seed: u64) -> (Vec<f64>, Vec<f64>) {
 }
 
 fn models() -> Vec<Noise> {
-    let of = |(memory, days, ratio)| Noise {
+    let of = |(memory, days, ratio, longer)| Noise {
         memory,
         days,
         ratio,
+        longer,
     };
     [
-        (Memory::Reading, 10.0, 2.0),
-        (Memory::Reading, f64::INFINITY, 0.5),
-        (Memory::Load, 15.0, 3.0),
-        (Memory::Load, 40.0, 1.0),
+        (Memory::Reading, 10.0, 2.0, 0.0),
+        (Memory::Reading, f64::INFINITY, 0.5, 0.0),
+        (Memory::Reading, 2.0, 1.0, 40.0),
+        (Memory::Load, 15.0, 3.0, 0.0),
+        (Memory::Load, 40.0, 1.0, 0.0),
     ]
     .map(of)
     .to_vec()
@@ -120,6 +131,7 @@ fn noise_is_likeliest_under_its_own_memory() {
                 memory,
                 days,
                 ratio: 3.0,
+                longer: 0.0,
             };
             let (readings, _) = drawn(&problem, of(12.0), 7);
             let deviance = |days: &f64| {
@@ -174,6 +186,7 @@ fn a_load_acts_on_no_reading_while_the_slope_stands_still() {
         memory: Memory::Load,
         days: 15.0,
         ratio: 3.0,
+        longer: 0.0,
     };
     let whitener = Whitener::new(&problem, noise);
     let smoothed = whitener.smooth(&problem, &vec![0.0; COUNT]);
@@ -196,6 +209,7 @@ fn a_walk_does_not_follow_a_jump_of_velocities_that_are_read_with_an_error_in_pr
         memory: Memory::Reading,
         days: f64::INFINITY,
         ratio: 0.3,
+        longer: 0.0,
     };
     // What a law leaves that moves not at all; the walk has followed the first level after some readings.
     let settled = 60;
