@@ -176,7 +176,10 @@ fn first_day_of_three(reading: &[&str], wait_hours: i64) -> (bool, Option<i64>) 
     for hour in 1..30 {
         // Data time stays at the first readings of `a`; the clock goes on.
         let reported = if hour <= 2 {
-            read(&mut monitor, "a", hour, 28.0 + hour as f64)
+            // Displacement counts from the first reading of all.
+            let is_first = hour == 1 && reading.is_empty();
+            let value = if is_first { 0.0 } else { 28.0 + hour as f64 };
+            read(&mut monitor, "a", hour, value)
         } else {
             let until = start() + hour.hours();
             let silences_alone = false;
