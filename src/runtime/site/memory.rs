@@ -174,13 +174,10 @@ impl Site {
                 && let Some(parts) = self.memory_now()
             {
                 self.steps_since_memory = 0;
-                match store.save_memory(&parts, after) {
-                    Ok(()) => {
-                        tracing::info!(step = after, "stored steps judged again so far: saved")
-                    }
-                    Err(error) => {
-                        tracing::warn!(%error, "stored steps judged again so far: not saved")
-                    }
+                if let Err(error) = store.save_memory(&parts, after) {
+                    tracing::warn!(%error, "stored steps judged again so far: not saved");
+                } else {
+                    tracing::info!(step = after, "stored steps judged again so far: saved");
                 }
             }
         }
