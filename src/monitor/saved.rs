@@ -104,7 +104,7 @@ struct RestOf<'a> {
 }
 
 impl Monitor {
-    /// What has changed since [`Monitor::is_saved`] was last said: a part for each such benchmark, and the rest in
+    /// What has changed since [`Monitor::mark_saved`] was last called: a part for each such benchmark, and the rest in
     /// any case.
     ///
     /// # Errors

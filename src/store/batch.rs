@@ -157,14 +157,15 @@ impl Store {
         inner.committed(batch.steps.len() + batch.events.len(), written)
     }
 
-    /// Keeps the monitor's memory as of an earlier `step`.
+    /// Keeps all of the monitor's memory as of an earlier `step`, in place of what was kept.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn save_memory(&self, parts: &[MemoryPart], step: i64) -> Result<(), StoreError> {
+    pub fn replace_memory(&self, parts: &[MemoryPart], step: i64) -> Result<(), StoreError> {
         let mut inner = self.inner();
         let immediate = rusqlite::TransactionBehavior::Immediate;
         let transaction = inner.connection.transaction_with_behavior(immediate)?;
+        transaction.execute("DELETE FROM memory", [])?;
         write_memory(&transaction, parts, step)?;
         transaction.commit()?;
         Ok(())

@@ -170,11 +170,13 @@ impl Site {
                 self.stand_again(store)?;
             }
             // Where all of them are judged again, because what was saved cannot be read, a stop on the way must not begin it anew.
-            if self.steps_since_memory >= STEPS_A_MEMORY
+            // All of it: nothing of what was saved before is to stand beside it.
+            if from == 0
+                && self.steps_since_memory >= STEPS_A_MEMORY
                 && let Some(parts) = self.memory_now()
             {
                 self.steps_since_memory = 0;
-                if let Err(error) = store.save_memory(&parts, after) {
+                if let Err(error) = store.replace_memory(&parts, after) {
                     tracing::warn!(%error, "stored steps judged again so far: not saved");
                 } else {
                     tracing::info!(step = after, "stored steps judged again so far: saved");
